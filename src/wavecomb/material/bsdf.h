@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Interface of the BSDF of a shading program ("program" below). Directions are unit vectors in
-/// local space: z is the shading normal, and wo and wi point away from the surface.
+/// Interface of the BSDF class of a shading program. Directions are unit vectors in local space: z
+/// is the shading normal, and wo and wi point away from the surface.
 ///
-/// A program is a class template `Bsdf<F>` with
+/// Each shading program has a BSDF class template `Bsdf<F>` with these members:
 ///
 ///   static constexpr ProgramId kProgram;
 ///   static constexpr uint32_t kInputs;      inputs whose textures it reads
@@ -22,8 +22,8 @@
 /// delta_probability, eval, diffuse_f_cos and sample also accept the result of view(wo) in place of
 /// wo.
 ///
-/// A program for scattering in media (kOnSurface false) has a phase function in place of the BSDF,
-/// without a cosine, and
+/// If `kOnSurface` is false, the program shades collisions in media. Its class evaluates a phase
+/// function without a cosine factor, and has one more member:
 ///
 ///   static auto interact(const Vertex<F>&);    the interaction, see path/steps/interact.h
 #pragma once
@@ -38,29 +38,29 @@ namespace wavecomb {
 /// Compile-time properties of a shading program. The class of a program derives from BsdfTraits and
 /// overrides the members whose values differ.
 struct BsdfTraits {
-  static constexpr bool kEmits = false;  ///< whether materials of the program may emit
-  /// Whether the program attenuates rays inside objects (Params::transmittance)
+  static constexpr bool kEmits = false;  ///< whether materials of this program may emit light
+  /// Whether the program attenuates rays inside objects by `Params::transmittance`.
   static constexpr bool kAbsorbs = false;
-  static constexpr bool kHasNonDelta = true;  ///< whether the program has lobes that light
-                                              ///< samples can evaluate
+  /// Whether the program has lobes other than delta lobes.
+  static constexpr bool kHasNonDelta = true;
   /// Whether non-delta lobes may transmit to the other side of the surface.
   static constexpr bool kTransmits = false;
-  static constexpr bool kHasSubsurface = false;  ///< whether the program has subsurface random
-                                                 ///< walks and `enters(wo, wi)`
-  static constexpr bool kHasTerminator = true;   ///< whether the program offsets rays at the shadow
-                                                 ///< terminator
-  static constexpr bool kTextured = true;        ///< whether materials of the program may read
-                                                 ///< textures or graphs
-  static constexpr bool kReadsIor = false;       ///< whether the program reads the index of
-                                                 ///< refraction
+  /// Whether the program has subsurface random walks; if so, the class has `enters(wo, wi)`.
+  static constexpr bool kHasSubsurface = false;
+  /// Whether ray origins are offset to hide artefacts at the shadow terminator.
+  static constexpr bool kHasTerminator = true;
+  static constexpr bool kTextured = true;   ///< whether materials of the program may read
+                                            ///< textures or graphs
+  static constexpr bool kReadsIor = false;  ///< whether the program reads the index of
+                                            ///< refraction
   /// Whether the program shades surface hits; programs of media have an interact() function
   /// instead.
   static constexpr bool kOnSurface = true;
   static constexpr bool kOnGaussianSplats = false;  ///< whether the program provides the emission
                                                     ///< of Gaussian splats
-  /// Whether the program scatters like a whole fibre: the x axis of the local frame lies along the
-  /// fibre (geometry/hit/fibre_frame.h), and the surface does not have two sides. Such a BSDF is
-  /// not reciprocal, so light paths exclude it.
+  /// Whether the BSDF describes scattering by a whole fibre. The x axis of the local frame then
+  /// lies along the fibre (geometry/hit/fibre_frame.h), and the surface has no inner side. Such a
+  /// BSDF is not reciprocal, so light paths exclude it.
   static constexpr bool kOnFibre = false;
 
   /// Returns the values that depend only on wo, which functions such as eval() take as input. By
@@ -69,21 +69,21 @@ struct BsdfTraits {
   static const Wo& view(const Wo& wo) {
     return wo;
   }
-  /// Returns the lanes whose light samples may lie on the other side of the surface, for programs
-  /// that transmit. A program variant returns the same lanes as the full program.
+  /// Returns the lanes in which a light behind the surface can contribute, for programs that
+  /// transmit light. A program variant returns the same lanes as the complete program.
   static bool passes_light() { return true; }
 };
 
-/// f(wo, wi) |cos theta_i|, and the solid-angle density with which sample() would choose wi. Both
-/// values exclude delta lobes.
+/// Result of eval(): f(wo, wi) |cos theta_i|, and the solid-angle density with which sample()
+/// chooses `wi`. Delta lobes contribute to neither value.
 template <typename F>
 struct BsdfEval {
   Color<F> f_cos;
   F pdf;
 };
 
-/// A sampled direction with weight = f |cos theta_i| / pdf. Lanes without a valid sample have
-/// weight 0 and pdf 0. For a delta lobe, pdf is the probability of choosing the lobe.
+/// A sampled direction `wi`, with `weight` = f |cos theta_i| / pdf. Lanes without a valid sample
+/// have weight 0 and pdf 0. For a delta lobe, pdf is the probability of choosing the lobe.
 template <typename F>
 struct BsdfSample {
   Vec3<F> wi;
@@ -91,15 +91,16 @@ struct BsdfSample {
   F pdf;
   Mask<F> is_delta;
   /// Relative index of refraction across the surface (eta_t / eta_i); 1 for reflection and for
-  /// straight transmission. Throughput includes the radiance scaling of refraction, which Russian
-  /// roulette removes by this factor.
+  /// straight transmission. Refraction scales the throughput by 1 / eta^2. Russian roulette
+  /// multiplies by `eta`^2 to ignore this scaling.
   F eta;
-  /// Perceptual roughness of the chosen lobe (1 for diffuse), for ray cones.
+  /// Perceptual roughness of the sampled lobe (1 for diffuse lobes), which widens the ray cone.
   F roughness;
 };
 
-/// Base class of programs whose view holds more than wo. Adds overloads that take wo and compute
-/// the view; programs import them with using-declarations.
+/// Base class of BSDFs whose view() returns more than `wo`. Adds overloads of delta_probability(),
+/// eval(), diffuse_f_cos() and sample() that take `wo` and call view(). Derived classes import the
+/// overloads by using-declarations.
 template <typename Bsdf, typename F>
 struct ViewedBsdf : BsdfTraits {
   F delta_probability(const Vec3<F>& wo) const { return self().delta_probability(self().view(wo)); }
@@ -124,7 +125,7 @@ inline BsdfSample<F> empty_sample() {
       Vec3<F>(F(0.f), F(0.f), F(1.f)), Color<F>(F(0.f)), F(0.f), Mask<F>(false), F(1.f), F(1.f)};
 }
 
-/// Selects `a` in lanes of `m`, and `b` elsewhere.
+/// Returns the sample `a` in the lanes of mask `m`, and `b` in all other lanes.
 template <typename F>
 inline BsdfSample<F> select_sample(const Mask<F>& m, const BsdfSample<F>& a,
                                    const BsdfSample<F>& b) {
@@ -133,7 +134,7 @@ inline BsdfSample<F> select_sample(const Mask<F>& m, const BsdfSample<F>& a,
           select(m, a.eta, b.eta),  select(m, a.roughness, b.roughness)};
 }
 
-/// Values of all inputs at a hit, as returned by fetch_params.
+/// Values of all material inputs at a hit, returned by fetch_params().
 template <typename F>
 struct ShadingParams {
   Color<F> base_color, specular_color, emission;
@@ -144,8 +145,8 @@ struct ShadingParams {
   UInt<F> flags;
 };
 
-/// Inputs plus the program-specific parameters, in the order of their row
-/// (material/description/programs.h).
+/// Material inputs at a hit, and in `own` the program-specific parameters, in the order of the
+/// program's row in material/description/programs.h.
 template <typename F>
 struct SpecificShadingParams : ShadingParams<F> {
   std::array<F, kMaxProgramParameters> own;

@@ -12,10 +12,11 @@
 namespace wavecomb {
 namespace {
 
-using F = FloatP<16>;  // one sample per lane
+using F = FloatP<16>;  // each lane processes one sample
 constexpr uint32_t kSamples = 1536;
 
-/// Roberts' low-discrepancy sequence R2. By symmetry, u covers half of the azimuths.
+/// Sample values of Roberts' low-discrepancy sequence R2. `u` covers only half of the azimuths,
+/// because an isotropic surface is symmetric.
 struct Numbers {
   alignas(64) float u[kSamples], v[kSamples];
 
@@ -31,15 +32,16 @@ struct Numbers {
   }
 };
 
-/// Mean of all samples, raised by 0.3 % so that no interpolated albedo adds energy.
+/// Returns the mean of all samples, given their sum in each lane. The mean is raised by 0.3 %, so
+/// that scaling by an interpolated albedo never adds energy.
 float mean(const F& lanes) {
   float sum = 0;
   for (size_t i = 0; i < 16; ++i) sum += lane(lanes, i);
   return sum * (1.003f / kSamples);
 }
 
-/// Sampled visible normals for a viewer, with their cosines to the viewer and G2 / G1 of their
-/// reflections.
+/// Sampled visible microfacet normals for a viewing direction. `cosine` is the cosine between
+/// normal and viewing direction, and `up` is G2 / G1 for the reflected direction.
 struct Normals {
   Ggx<F> ggx{F(0.f)};
   Vec3<F> wo;
@@ -143,7 +145,8 @@ void EnergyTables::add_brushed() {
           const Vec3<F> wo(F(s * x), F(s * std::sqrt(1 - x * x)), F(z));
           F white(0.f), reflected(0.f);
           for (uint32_t k = 0; k < kSamples; k += 16) {
-            // Anisotropic surfaces need all azimuths, hence the factor 2.
+            // The factor 2 extends `u` to all azimuths, because an anisotropic surface is not
+            // symmetric.
             const Vec3<F> h =
                 ggx.sample_visible(wo, F(2.f * load<F>(numbers.u + k)), load<F>(numbers.v + k));
             const F c = clamp(dot(wo, h), F(0.f), F(1.f));

@@ -13,12 +13,14 @@
 
 namespace wavecomb {
 
-/// Directional albedos of GGX for one bounce by cosine, roughness and index; quadrature rules that
-/// integrate any reflectance; and albedos of anisotropic surfaces by both roughnesses and azimuth.
+/// Tables of directional albedos of GGX interfaces for a single bounce. The first tables are
+/// indexed by cosine, roughness and index of refraction. Quadrature rules integrate the reflectance
+/// of other microfacets. Further tables hold the albedos of anisotropic surfaces, indexed by
+/// cosine, azimuth and both roughnesses.
 class EnergyTables {
  public:
-  /// Nodes by sqrt(cosine), by roughness (alpha = roughness^2), and by the square root of (eta - 1)
-  /// / (eta + 1). These spacings are denser near 0, where values change fast.
+  /// Number of table nodes along sqrt(cosine), roughness (alpha = roughness^2), and the square root
+  /// of (eta - 1) / (eta + 1). These spacings are denser near 0, where values change fast.
   static constexpr uint32_t kCosines = 32, kRoughnesses = 24, kIndices = 28;
   /// (eta - 1) / (eta + 1) of the last index node, for eta = kMaxIor = 10.
   static constexpr float kLastIndex = 9.f / 11.f;
@@ -26,8 +28,8 @@ class EnergyTables {
   /// Number of nodes of a quadrature rule. Each node takes two planes of the table: the square root
   /// of the cosine, and the weight.
   static constexpr uint32_t kRule = 6, kRuleAt = kPlane + 3 * kVolume;
-  /// Anisotropic surfaces: nodes by sqrt(cosine), |cos phi|, sqrt(alpha_y / alpha_x) and
-  /// sqrt(alpha_x).
+  /// Number of table nodes of anisotropic surfaces along |cos phi|, sqrt(alpha_y / alpha_x) and
+  /// sqrt(alpha_x). The nodes along sqrt(cosine) are the same as for isotropic surfaces.
   static constexpr uint32_t kAzimuths = 8, kRatios = 8, kAlongs = 16;
   static constexpr uint32_t kBrushed = kCosines * kAzimuths * kRatios * kAlongs;
   static constexpr uint32_t kBrushedAt = kRuleAt + 2 * kRule * kPlane;
@@ -51,11 +53,11 @@ class EnergyTables {
 /// Returns the energy tables for MaterialView::energy, or nullptr if no material needs them.
 const float* energy_tables(std::span<const Material> materials);
 
-/// Interpolated lookup in lanes; `table` is EnergyTables::data().
+/// Interpolated lookup of energy tables, one lookup in each lane. `table` is EnergyTables::data().
 template <typename F>
 struct EnergyLookup {
   const float* table;
-  UInt<F> node;  ///< index of the lower node in cosine and roughness
+  UInt<F> node;  ///< index of the table node below the cosine and the roughness
   F at_cosine, at_roughness;
 
   EnergyLookup(const float* values, const F& cosine, const F& roughness) : table(values) {
@@ -121,7 +123,7 @@ template <typename F>
 struct BrushedLookup {
   const float* table;
   UInt<F> node;
-  F at[4];  ///< fractions between nodes: cosine, azimuth, ratio, alpha_x
+  F at[4];  ///< interpolation weights along cosine, azimuth, ratio of roughnesses, and alpha_x
 
   BrushedLookup(const float* values, const Vec3<F>& o, const F& ax, const F& ay) : table(values) {
     using T = EnergyTables;

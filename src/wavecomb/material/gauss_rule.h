@@ -21,7 +21,8 @@ struct PointMass {
 /// nearly coincide, all n nodes are their mean.
 template <size_t n>
 inline std::array<PointMass, n> gauss_rule(const std::vector<PointMass>& points) {
-  // Recurrence p_(k+1) = (x - a_k) p_k - b_k p_(k-1), with norm_k = sum of weight p_k^2.
+  // Recurrence of the orthogonal polynomials: p_(k+1) = (x - a_k) p_k - b_k p_(k-1), with norm_k =
+  // sum of weight p_k^2.
   std::array<double, n> a{}, b{}, norm{};
   std::vector<double> before(points.size(), 0.0), now(points.size(), 1.0);
   std::array<PointMass, n> rule{};

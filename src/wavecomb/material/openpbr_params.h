@@ -11,16 +11,17 @@
 
 namespace wavecomb {
 
-/// Parameters in addition to the inputs base_color, metallic, roughness (specular), specular_color,
-/// clearcoat and clearcoat_roughness (coat), and ior. The struct OpenPbr
-/// (material/description/openpbr_inputs.h) documents the parameters.
+/// Parameters of the program "openpbr" at a hit. ShadingParams holds the inputs shared with other
+/// programs: `roughness` is the specular roughness, and `clearcoat` and `clearcoat_roughness` are
+/// the coat's weight and roughness. The struct OpenPbr (material/description/openpbr_inputs.h)
+/// documents the parameters.
 template <typename F>
 struct OpenPbrParams : ShadingParams<F>, OpenPbrInputs<F> {
   F thin_walled;        ///< 0 or 1
   F subsurface;         ///< SubsurfaceKind of the subsurface random walk
   const float* energy;  ///< EnergyTables
 
-  /// Fetches the parameters of this program, see fetch_params.
+  /// Evaluates the parameters at a hit, with the same arguments as fetch_params().
   template <uint32_t kInputs, bool kGraphs = true, typename MakePoint>
   static OpenPbrParams fetch(const MaterialView& view, const UInt<F>& material, const Vec2<F>& uv,
                              const Footprint<F>& footprint, const MakePoint& make_point,

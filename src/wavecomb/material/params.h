@@ -51,8 +51,8 @@ WAVECOMB_INLINE ShadingParams<F> evaluate_params(const MaterialView& view, const
 
 }  // namespace detail
 
-/// Replaces parameters in `p` by the outputs of the material's graph; completes evaluate_params.
-/// `make_point(active)` returns the GraphPoint and is called only if a lane has a graph.
+/// Replaces parameters in `p`, as returned by evaluate_params(), by the outputs of the material's
+/// graph. `make_point(active)` returns the GraphPoint and is called only if a lane has a graph.
 template <typename F, typename Params, typename MakePoint>
 WAVECOMB_INLINE void complete_params(const MaterialView& view, const UInt<F>& material,
                                      const MakePoint& make_point, const Mask<F>& active,
@@ -72,11 +72,12 @@ WAVECOMB_INLINE void complete_params(const MaterialView& view, const UInt<F>& ma
   }
 }
 
-/// Evaluates the parameters of `material` at `uv` and clamps them to valid ranges. Inputs in
-/// `kInputs` may read textures, others use their constants. `footprint` is the ray's footprint in
-/// uv. `kGraphs` false skips value graphs; otherwise graphs receive the point that `make_point`
-/// returns. The returned `opacity` is 1 for materials that use opacity as presence (cut-outs),
-/// which fetch_opacity returns. Values of inactive lanes are unspecified but finite.
+/// Evaluates the parameters of `material` at `uv` and clamps them to valid ranges. `kInputs` is a
+/// mask of the inputs that may read textures. All other inputs are constants. `footprint` is the
+/// ray's footprint in uv. If `kGraphs` is false, value graphs are skipped. Otherwise
+/// `make_point(active)` returns the inputs of the graphs. For cut-out materials, the returned
+/// `opacity` is 1, because fetch_opacity() computes the presence of the surface. Values of inactive
+/// lanes are unspecified but finite.
 template <uint32_t kInputs, typename F, bool kGraphs = true, typename MakePoint>
 WAVECOMB_INLINE ShadingParams<F> fetch_params(const MaterialView& view, const UInt<F>& material,
                                               const Vec2<F>& uv, const Footprint<F>& footprint,
@@ -95,7 +96,7 @@ WAVECOMB_INLINE ShadingParams<F> fetch_params(const MaterialView& view, const UI
 }
 
 namespace detail {
-/// Reads the first `kOwn` program-specific parameters; the rest are 0.
+/// Reads the first `kOwn` program-specific parameters. Parameters from `kOwn` on are set to 0.
 template <size_t kOwn, typename F>
 WAVECOMB_INLINE std::array<F, kMaxProgramParameters> specific_values(const MaterialView& view,
                                                                      const UInt<F>& material,
@@ -123,7 +124,8 @@ struct ParamsOf<Bsdf, F> {
 template <typename Bsdf, typename F>
 using ParamsOf = typename detail::ParamsOf<Bsdf, F>::Type;
 
-/// Fetches the parameters of program `Bsdf`, see fetch_params.
+/// Evaluates the parameters of the program with class `Bsdf`, with the same arguments as
+/// fetch_params().
 template <typename Bsdf, uint32_t kInputs, typename F, typename MakePoint>
 WAVECOMB_INLINE ParamsOf<Bsdf, F> fetch_for(const MaterialView& materials, const UInt<F>& material,
                                             const Vec2<F>& uv, const Footprint<F>& footprint,

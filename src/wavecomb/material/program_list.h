@@ -28,7 +28,8 @@ struct ProgramList {
 };
 
 namespace detail {
-/// Removes the first entry of a list, a placeholder that simplifies commas in the macro below.
+/// Removes the first entry of a program list. The entry `void` is a placeholder, so that the macro
+/// in `Programs` can put a comma before each program.
 template <typename First, typename... Bsdf>
 ProgramList<Bsdf...> list_behind(ProgramList<First, Bsdf...>);
 }  // namespace detail
@@ -58,11 +59,12 @@ template <typename Last, typename... Bsdf>
 ProgramList<Bsdf..., Last> list_before(ProgramList<Bsdf...>);
 }  // namespace detail
 
-/// `List` with one program appended.
+/// The program list `List` with the program `Last` appended.
 template <typename List, typename Last>
 using AppendedProgram = decltype(detail::list_before<Last>(List{}));
 
-/// Id of a program: its position in the list, or its kProgram if it is not in the list.
+/// Id of a program: its position in `Programs`, or `Bsdf::kProgram` for a class that is not in
+/// `Programs`.
 template <typename Bsdf, typename F>
 constexpr size_t id_of() {
   constexpr size_t kProgramIndex = detail::program_index<Bsdf>(Programs<F>{});

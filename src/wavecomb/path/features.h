@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Features that vertex kernels are compiled with (kernel_matrix.h): all of them, or, for plain
-/// kernels, only those that simple scenes need. A joint transport is not a feature flag, since
-/// kernels select it by a template type (joint_transport.h).
+/// Optional features of vertex kernels (kernel_matrix.h). General kernels are compiled with all
+/// features, and plain kernels only with the features that simple scenes need. A joint transport is
+/// not a feature flag, since kernels select it by a template type (joint_transport.h).
 #pragma once
 
 #include <cstdint>
@@ -9,11 +9,11 @@
 namespace wavecomb {
 
 enum Feature : uint32_t {
-  kMotion = 1,         ///< moving meshes or instances
+  kMotion = 1,         ///< support for moving meshes and instances
   kCurves = 2,         ///< curves and points
   kLinks = 4,          ///< light linking
-  kMeshLights = 8,     ///< mesh lights, and lights that only light sampling finds
-  kRecordsAovs = 16,   ///< AOVs of vertices, path histories
+  kMeshLights = 8,     ///< mesh lights, and lights with LightEffect
+  kRecordsAovs = 16,   ///< recording of AOVs and path histories at vertices
   kExperiments = 32,   ///< cosine sampling, Schlick's approximation
   kSubsurface = 64,    ///< subsurface scattering
   kNestedMedia = 128,  ///< nested dielectrics

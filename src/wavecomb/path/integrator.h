@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Interface of integrators. A render owns one integrator, which each worker calls for one task
-/// after the other.
+/// Interface of integrators. A render owns one integrator, and all workers submit their tasks to
+/// this integrator.
 #pragma once
 
 #include <cstddef>
@@ -14,7 +14,8 @@ class PhaseClock;
 struct CoherenceCounts;
 struct Counts;
 
-/// Pixels (x | y << 16) and their samples [first_sample, first_sample + samples).
+/// Task of a worker: to trace the samples [first_sample, first_sample + samples) of `pixels`. A
+/// pixel is encoded as x | y << 16.
 struct WaveTask {
   const uint32_t* pixels;
   uint32_t pixel_count;
@@ -26,9 +27,9 @@ struct WaveTask {
   uint32_t path_count() const { return pixel_count * samples; }
 };
 
-/// Statistics and training data of a worker; null if the integrator has none. All members except
-/// `counts` may be read only while the worker is idle; the worker's thread may read `counts` at any
-/// time.
+/// Statistics and training data of a worker. A pointer is null if the integrator does not collect
+/// the data. All members except `counts` may be read only while the worker is idle; the worker's
+/// thread may read `counts` at any time.
 struct WorkerView {
   const PhaseClock* clock = nullptr;
   const Counts* counts = nullptr;
@@ -49,11 +50,12 @@ class Integrator {
   virtual ~Integrator() = default;
 
   virtual void begin_pass() {}
-  /// Renders a task to its end.
+  /// Traces all paths of a task.
   virtual void run(size_t worker, const WaveTask& task) = 0;
   virtual void end_pass() {}
 
-  /// Returns the statistics of worker `i`, all null before its first task.
+  /// Returns the statistics of worker `i`. All pointers are null before the first task of the
+  /// worker.
   virtual WorkerView worker(size_t i) const = 0;
   /// Returns the number of SIMD lanes of the kernels.
   virtual uint32_t lanes() const = 0;

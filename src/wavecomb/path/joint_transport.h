@@ -34,15 +34,15 @@
 
 namespace wavecomb {
 
-/// First hit of a camera path.
+/// First hit point of a camera path.
 template <typename F>
 struct FirstHit {
   Vec3<F> p, dir;  ///< the point, and the direction of the ray
   F time;          ///< shutter time, if the camera moves
 };
 
-/// Coupling without effect, for renders without a joint transport. The functions are called in the
-/// order in which they are declared.
+/// Coupling for renders without a joint transport, whose functions do nothing. The functions are
+/// called in the order in which they are declared.
 template <typename F>
 struct NoCoupling {
   template <typename... Data>
@@ -61,7 +61,7 @@ struct NoCoupling {
     return weight;
   }
 
-  /// Begins a vertex whose light will be sampled.
+  /// Begins the light sampling of a vertex.
   template <typename Bsdf, typename V, typename Interaction>
   void begin(const V& /*v*/, const Interaction& /*at*/, const Frame<F>& /*frame*/) {}
 
@@ -74,7 +74,7 @@ struct NoCoupling {
     return weight;
   }
 
-  /// Offers the vertex to the joint transport.
+  /// Passes the vertex to the joint transport, which may store it.
   template <typename Context>
   void offer(const Context& /*c*/) {}
 
@@ -83,9 +83,9 @@ struct NoCoupling {
   void bounce(const Context& /*c*/, const Vec3<F>& /*world*/, const Bounce& /*b*/,
               PathState<F>& /*next*/) {}
 
-  /// Stores R, and the vertices that were offered. `next` is the state of the paths in the lanes
-  /// `alive`, which continue. `aovs` are the AOV values of the wave, which do not include this
-  /// vertex yet.
+  /// Stores the ratios R, and the vertices that were passed to offer(). `next` is the state of the
+  /// paths in the lanes `alive`, which continue. `aovs` are the AOV values of the wave, which do
+  /// not include this vertex yet.
   template <typename Aovs>
   void store(const UInt<F>& /*slot*/, const PathState<F>& /*next*/, const Mask<F>& /*alive*/,
              const Aovs& /*aovs*/, const Mask<F>& /*active*/) const {}

@@ -38,8 +38,8 @@
 
 namespace wavecomb {
 
-/// Ray segment without surfaces: points o + x d with 0 < x < t. The segment ends at the vertex of
-/// `depth` or, for a shadow ray, leads from that vertex to a light.
+/// Ray segment that crosses no surface: the points o + x d with 0 < x < t. The segment ends at the
+/// vertex of `depth` or, for a shadow ray, leads from that vertex to a light.
 template <typename F>
 struct MediumQuery {
   SamplerKind sampler;
@@ -60,10 +60,10 @@ struct Flight {
   /// probability of passing; with an event, transmittance times extinction divided by the density
   /// of t.
   Color<F> weight;
-  Mask<F> has_scattered{false};  ///< whether collisions without a vertex have moved the path
+  Mask<F> has_scattered{false};  ///< whether the path has scattered without creating a vertex
 };
 
-/// Scene without volumes and media.
+/// `Media` class of scenes without volumes and media.
 struct NoMedia {
   static constexpr bool kAny = false, kHasEmission = false, kStreams = false;
   template <typename F>

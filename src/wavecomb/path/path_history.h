@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Vertices of paths, stored until the path ends. Training reads the stored vertices, for example
-/// to estimate the incident radiance along a bounce,
+/// History of a path: its vertices, stored until the path ends. Training reads the stored vertices,
+/// for example to estimate the incident radiance along a bounce,
 ///   L_j = (R_end - R_j) / T_j
 /// where R_j is the radiance of the path after the light sample of vertex j, and T_j the throughput
 /// after the bounce.
@@ -20,7 +20,7 @@
 
 namespace wavecomb {
 
-/// Vertex of a path, and the bounce with which the path left it.
+/// Path vertex, with the bounce at the vertex.
 template <typename F>
 struct HistoryRow {
   Vec3<F> p;
@@ -29,8 +29,8 @@ struct HistoryRow {
   F pdf;                ///< solid angle density of wi; 0 for a delta bounce
   Color<F> radiance;    ///< R_j, including the light sample of this vertex
   UInt<F> material;
-  // The following fields are set only if a guiding field is used or in training (Vertex::guide).
-  UInt<F> axis;  ///< guiding_axis of the surface
+  // The following fields are set only if a guiding field is in use or in training (Vertex::guide).
+  UInt<F> axis;  ///< guiding_axis() of the surface at the vertex
   F bsdf_pdf;    ///< solid angle density of wi by the BSDF alone
   WAVECOMB_FIELDS(p, wi, throughput, pdf, radiance, material, axis, bsdf_pdf)
 };
@@ -51,7 +51,7 @@ struct ShadedVertex {
 class PathHistory {
  public:
   PathHistory() = default;
-  /// Allocates room for the first `most` vertices of each path.
+  /// Allocates memory for `capacity` paths with up to `most` vertices each.
   PathHistory(size_t capacity, uint32_t most)
       : most_(most),
         rows_(most ? SoaBlock(1, capacity * most * kRowWords<HistoryRow>) : SoaBlock()),

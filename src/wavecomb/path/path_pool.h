@@ -11,7 +11,7 @@
 
 namespace wavecomb {
 
-/// Ray, the first fields of both PathRow and ShadowRow.
+/// Ray. PathRow and ShadowRow begin with the same fields.
 template <typename F>
 struct RayHead {
   Vec3<F> o, d;
@@ -25,7 +25,8 @@ struct BodyEntry {
   UInt<F> normal{0u};  ///< packed normal at the entry, outwards
 };
 
-/// Camera path between two vertices. Each vertex reads the row and overwrites it with the next ray.
+/// Stored state of a camera path between two vertices. Shading a vertex reads the row and replaces
+/// its contents by the next ray.
 ///
 /// A ray that enters a subsurface body (enters_body()) uses neither a cone nor a receiver. The row
 /// then stores the BodyEntry in the words of the cone and the receiver, and marks this layout by
@@ -34,22 +35,23 @@ template <typename F>
 struct PathRow {
   Vec3<F> o, d;  ///< the ray to trace
   Color<F> throughput;
-  F pdf;        ///< density of the bounce that made the ray; 0 for a delta bounce or camera ray
-  F eta_scale;  ///< product of eta^2 of the refractions so far, for roulette
+  /// Density of the ray's direction when it was sampled; 0 for a delta bounce or camera ray.
+  F pdf;
+  F eta_scale;                ///< product of eta^2 over all refractions of the path, for roulette
   F cone_width, cone_spread;  ///< ray cone at the origin: width in scene units, spread in radians
   SampleKey<F> key;
-  UInt<F> receiver;  ///< LightReceiver::normal of the vertex that made the ray
+  UInt<F> receiver;  ///< LightReceiver::normal at the vertex where the ray starts
   WAVECOMB_FIELDS(o, d, throughput, pdf, eta_scale, cone_width, cone_spread, key, receiver)
 
   Mask<F> enters_body() const { return pdf < 0.f; }
-  /// Makes the rays of `lanes` enter a body. The rays' pdf must be above 0.
+  /// Marks the rays in `lanes` as entering a subsurface body. Their `pdf` must be above 0.
   void set_entry(const Mask<F>& lanes, const BodyEntry<F>& entry) {
     pdf = select(lanes, F(-pdf), pdf);
     cone_width = select(lanes, bits_float<F>(entry.normal), cone_width);
     receiver = select(Mask<UInt<F>>(lanes), entry.body, receiver);
   }
-  /// Returns the entry, and gives the ray a cone of width 0. `receiver` still holds the body
-  /// afterwards, because the ray queries of the walk read it.
+  /// Returns the entry into the body, removes the mark, and sets the cone width to 0. `receiver`
+  /// keeps the body, because the ray queries of the random walk read it.
   BodyEntry<F> take_entry() {
     const BodyEntry<F> entry{receiver, float_bits<F>(cone_width)};
     pdf = abs(pdf);
@@ -67,8 +69,9 @@ struct PathColdRow {
   WAVECOMB_FIELDS(time, link, importance)
 };
 
-/// Bits of MediumStackRow::crossed beside the material: whether the bounce and the shadow ray
-/// continue on the other side of the surface, and whether the path arrived from outside.
+/// Lowest bits of MediumStackRow::crossed, whose other bits hold the material. `kBounceCrosses` and
+/// `kShadowCrosses` mean that the bounce and the shadow ray continue on the other side of the
+/// surface. `kEnters` means that the path arrived from outside.
 enum Crossing : uint32_t { kBounceCrosses = 1, kShadowCrosses = 2, kEnters = 4 };
 inline constexpr uint32_t kCrossingBits = 3;
 
@@ -79,14 +82,14 @@ template <typename F>
 struct MediumStackRow {
   UInt<F> object_0, object_1, object_2, object_3, material_0, material_1, material_2, material_3;
   UInt<F> object;   ///< instance_geometry() of the vertex
-  UInt<F> crossed;  ///< result of shading the vertex: Crossing bits and the material
+  UInt<F> crossed;  ///< Crossing bits and the material, as shading the vertex determined them
   F outer;          ///< PathState::outer and PathState::medium of the vertex
   UInt<F> medium;
   WAVECOMB_FIELDS(object_0, object_1, object_2, object_3, material_0, material_1, material_2,
                   material_3, object, crossed, outer, medium)
 };
 
-/// Shadow ray of a path, which has at most one at each vertex.
+/// Stored shadow ray of a path. Each vertex has at most one shadow ray.
 template <typename F>
 struct ShadowRow {
   Vec3<F> o, d;
@@ -97,7 +100,7 @@ struct ShadowRow {
   WAVECOMB_FIELDS(o, d, tfar, direct, group, set)
 };
 
-/// First fields of ShadowRow, which the shadow queue copies.
+/// First fields of ShadowRow. The shadow queue holds copies of these fields.
 template <typename F>
 struct ShadowHead {
   Vec3<F> o, d;
@@ -117,9 +120,9 @@ inline constexpr size_t kRadianceWords = kRowWords<RadianceRow>;
 static_assert(kRowWords<PathRow> == 16 && kRowWords<ShadowRow> == 16, "a cache line each");
 static_assert(kIsHead<RayHead, PathRow> && kIsHead<RayHead, ShadowRow>);
 
-/// Path state of one wave. A slot holds one (pixel, sample) for the lifetime of its path. The state
-/// of a path is a row of one cache line, and the shadow ray is a second row, so that shading
-/// touches only the cache lines of the paths it shades, in any order of hits
+/// Path state of one wave. Each slot belongs to one sample of a pixel until its path ends. The
+/// state of a path is a row of one cache line, and the shadow ray is a second row, so that shading
+/// reads only the cache lines of the paths whose hits it processes, in whatever order
 /// (docs/decisions/path-rows.md).
 ///
 /// Contract: owned by one wave.
@@ -143,14 +146,16 @@ class PathPool {
     diffuse = split ? diffuse_.floats(0) : nullptr;
   }
 
-  float* paths = nullptr;          ///< PathRow, or the row of a joint transport of the same size
+  /// PathRow of each slot, or a row of the joint transport, which has the same size.
+  float* paths = nullptr;
   float* shadows = nullptr;        ///< ShadowRow
   float* radiance = nullptr;       ///< RadianceRow
   float* cold = nullptr;           ///< PathColdRow, or null
   float* medium_stacks = nullptr;  ///< MediumStackRow; null without nested dielectrics
   float* shadow_tints =
       nullptr;  ///< RadianceRow of VertexResult::shadow_tint; null if shadows are black
-  /// RadianceRow of PathState::diffuse; null if no light has multipliers
+  /// RadianceRow with PathState::diffuse of each slot; null if no light has diffuse or specular
+  /// multipliers
   float* diffuse = nullptr;
   size_t bytes() const {
     return rows_.bytes() + cold_.bytes() + medium_stacks_.bytes() + shadow_tints_.bytes() +
@@ -161,7 +166,8 @@ class PathPool {
   SoaBlock rows_, cold_, medium_stacks_, shadow_tints_, diffuse_;
 };
 
-/// Adds `c` to the active lanes' rows of `radiance`. The rows must be distinct.
+/// Adds `c` to the rows of `radiance` with the indices `row`, in active lanes. The indices must
+/// differ between lanes.
 template <typename F>
 WAVECOMB_INLINE void add_radiance(float* radiance, const UInt<F>& row, const Color<F>& c,
                                   const Mask<F>& active) {

@@ -43,13 +43,13 @@ struct ShadeSettings {
         filters_all_lookups(s.texture_filter == TextureFilter::kWhole),
         shows_environment(!s.alpha) {}
 
-  /// Returns whether a path that leaves the scene after `depth` vertices adds the environment's
-  /// light.
+  /// Returns whether a path that leaves the scene after `depth` vertices receives the light of the
+  /// environment.
   bool adds_environment(uint32_t depth) const { return shows_environment || depth > 0; }
 };
 
-/// State of a path at a vertex. `dir` is the direction of the ray that arrived, and the ray cone is
-/// given at the hit.
+/// State of a path at a vertex. `dir` is the direction of the ray that hit the vertex. The ray cone
+/// is given at the hit point.
 template <typename F>
 struct PathState {
   Vec3<F> dir;
@@ -60,9 +60,10 @@ struct PathState {
   Vec3<F> o;             ///< origin of the ray that arrived
   UInt<F> receiver{0u};  ///< LightReceiver::normal of the previous vertex
   UInt<F> link{0u};      ///< link class of the surface that the ray left, if lights are linked
-  F importance{0.f};     ///< one over the brightness of the image at the pixel; 0 if unknown
-  /// Density with which a joint transport samples this path, relative to the path's own density and
-  /// up to the density of the light's emission (joint_transport.h); 0 without a joint transport.
+  F importance{0.f};  ///< reciprocal of the estimated brightness of the path's pixel; 0 if unknown
+  /// Ratio R (joint_transport.h): the density with which a joint transport samples this path,
+  /// divided by the density of bounces. The density of the light's emission is not included. R is 0
+  /// without a joint transport.
   F ratio{0.f};
   Mask<F> enters_body{false};  ///< whether the bounce enters a subsurface body
   BodyEntry<F> entry{};        ///< that body
@@ -111,7 +112,8 @@ WAVECOMB_INLINE PathRow<F> path_row(const PathState<F>& next, const SampleKey<F>
   return row;
 }
 
-/// Output of shading one vertex. Values of lanes outside the masks are undefined.
+/// Result of shading one vertex. Lanes that are not set in `has_shadow` or `alive` have undefined
+/// values in the fields of the shadow ray or of the next ray.
 template <typename F>
 struct VertexResult {
   Color<F> emitted;    ///< emission to add to the path's radiance, already clamped
@@ -121,7 +123,8 @@ struct VertexResult {
   UInt<F> shadow_set;  ///< result of shadow_set(); 0 without light linking
   Color<F> direct;     ///< contribution if the shadow ray is free, already clamped
   Color<F>
-      shadow_tint;    ///< fraction of `direct` that remains if the shadow ray is blocked, by colour
+      /// Fraction of `direct` that remains if the shadow ray is blocked, for each colour channel.
+      shadow_tint;
   Mask<F> alive;      ///< whether the path continues
   PathState<F> next;  ///< ray and state of the next path segment
   // For training of the guiding field, if Vertex::guide is set: guiding_axis of the surface, and
@@ -131,8 +134,9 @@ struct VertexResult {
   UInt<F> crossed;  ///< MediumStackRow::crossed, if the scene has nested dielectrics
 };
 
-/// Classification of a scattering for light path expressions: its PathEvent, and its diffuse
-/// fraction by colour. The rest is glossy, or specular if `is_delta`.
+/// Classification of a scattering event for light path expressions: the PathEvent, and the diffuse
+/// fraction for each colour channel. The remaining fraction is specular if `is_delta` is set, and
+/// glossy otherwise.
 template <typename F>
 struct ScatteringEvent {
   UInt<F> event{0u};
@@ -164,7 +168,7 @@ struct VertexAovs {
   F guided, survival;
 };
 
-/// Auxiliary albedo and normal for a denoiser.
+/// Albedo and normal at a vertex, as auxiliary inputs of a denoiser.
 template <typename F>
 struct Guides {
   Color<F> albedo;
@@ -172,7 +176,7 @@ struct Guides {
 };
 
 /// Returns the denoiser inputs at a vertex: albedo, tinted by the mirrors and glass before it, and
-/// normal. At a vertex with `is_clear`, the next vertex replaces both values.
+/// normal. If `is_clear` is set, the values of the next vertex replace these values.
 template <typename F>
 inline Guides<F> guides_of(const VertexAovs<F>& v, const PathState<F>& path) {
   const auto tinted = [&](const F& albedo, const F& throughput) {
@@ -202,7 +206,7 @@ struct Vertex {
   const PathState<F>& path;
   VertexAovs<F>* aovs;  ///< null if no AOV needs the vertex
   const Mask<F>& active;
-  const GuidingView* guide = nullptr;  ///< guiding field that guides bounces or is in training
+  const GuidingView* guide = nullptr;  ///< guiding field that is used for bounces or is in training
 
   static constexpr bool has(Feature feature) { return (kFeatures & feature) != 0; }
   /// Returns the AOV values to write, or null.
@@ -218,8 +222,8 @@ struct Vertex {
 /// the light's surface.
 inline constexpr float kShadowRayFraction = 0.9999f;
 
-/// Limit of contributions: scales a contribution to a luminance of at most `limit` (0 means no
-/// limit), and drops contributions that are not finite.
+/// Limits a contribution to a luminance of at most `limit` by scaling, where 0 means no limit, and
+/// drops contributions that are not finite.
 template <typename F>
 class ContributionLimit {
  public:
@@ -231,8 +235,8 @@ class ContributionLimit {
     const F y = luminance(finite(whole));
     scale_ = select(y > limit, F(limit / max(y, F(1e-30f))), F(1.f));
   }
-  /// Returns the limited contribution of `part`, which is a summand of the contribution given to
-  /// the constructor or all of it.
+  /// Returns `part`, limited by the same factor as the contribution given to the constructor.
+  /// `part` is a summand of this contribution or equal to it.
   Color<F> of(const Color<F>& part) const {
     return limited_ ? finite(part) * scale_ : finite(part);
   }
@@ -257,8 +261,8 @@ inline float clamp_limit(const ShadeSettings& s, uint32_t bounces) {
   return bounces > 1 ? s.clamp_indirect : 0.f;
 }
 
-/// Returns the index of geometry `geom` of instance `inst` in arrays that have one entry for each
-/// geometry of each instance.
+/// Returns the index of geometry `geom` of instance `inst`, for arrays with one entry per geometry
+/// of each instance.
 template <typename F>
 inline UInt<F> instance_geometry(const SceneView& scene, const UInt<F>& inst, const UInt<F>& geom,
                                  const Mask<F>& active) {

@@ -18,15 +18,16 @@ enum class Phase : uint8_t {
   kShade,
   kShadow,
   kResolve,
-  kMetrics,  ///< time spent on statistics of other phases, which is not part of rendering
+  kMetrics,  ///< time spent on measuring statistics instead of rendering
 };
 inline constexpr size_t kPhaseCount = 10;
 inline constexpr const char* kPhaseNames[kPhaseCount] = {
     "generate",    "order_rays", "trace",  "keys",    "sort",
     "materialize", "shade",      "shadow", "resolve", "metrics"};
 
-/// Clock of exclusive phases: entering a phase ends the previous one, so that all phases add up to
-/// the time between start() and stop(). Used once per batch of work, never per ray.
+/// Clock that measures the time of each phase. Entering a phase ends the previous phase, so the
+/// times of all phases add up to the time between start() and stop(). Used once per batch of work,
+/// never per ray.
 class PhaseClock {
  public:
   using Clock = std::chrono::steady_clock;

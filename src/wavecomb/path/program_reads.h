@@ -11,7 +11,7 @@ namespace wavecomb {
 struct ProgramReads {
   uint32_t inputs = 0;  ///< bit i is set if the program reads Input i
   bool ior = false;
-  /// Whether the program has parameters beyond those of UsdPreviewSurface.
+  /// Whether the program has parameters that UsdPreviewSurface lacks.
   bool has_more = false;
 };
 

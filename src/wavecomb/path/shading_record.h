@@ -7,8 +7,8 @@
 
 namespace wavecomb {
 
-/// Instance of the records of volume events, which have no surface. Differs from kNoHit and
-/// kLightShape, which have no records.
+/// Value of ShadingRecord::inst for volume events, which have no surface. The value differs from
+/// kNoHit and kLightShape, for which no ShadingRecord is made.
 inline constexpr uint32_t kNoSurface = 0xfffffffdu;
 static_assert(kNoSurface < kLightShape && kLightShape < kNoHit);
 
@@ -32,7 +32,7 @@ struct ShadingRecord {
   }
 };
 
-/// Returns `a` in the lanes of `m`, else `b`.
+/// Returns the record `a` in the lanes of mask `m`, and `b` in all other lanes.
 template <typename F>
 inline ShadingRecord<F> select_record(const Mask<F>& m, const ShadingRecord<F>& a,
                                       const ShadingRecord<F>& b) {

@@ -14,8 +14,8 @@ inline constexpr uint32_t kCountedDepths = 32;
 /// Counters of ray segments in volumes.
 struct VolumeCounts {
   uint64_t steps = 0;       ///< grid cells visited by paths and shadow rays, plus collisions
-  uint64_t collisions = 0;  ///< tentative collisions, real or null
-  uint64_t lanes = 0;       ///< lanes of the packets, both active and inactive
+  uint64_t collisions = 0;  ///< tentative collisions, which are real or null collisions
+  uint64_t lanes = 0;       ///< SIMD lanes of all processed packets, both active and inactive
 
   void add(const VolumeCounts& o) {
     steps += o.steps;

@@ -16,7 +16,8 @@
 
 namespace wavecomb {
 
-/// Returns MediumStackRow::crossed of a vertex whose bounce and shadow ray are in `out`.
+/// Returns the value of MediumStackRow::crossed for a vertex. `out` holds the bounce and the shadow
+/// ray of the vertex.
 template <typename F, uint32_t kFeatures>
 inline UInt<F> crossed_at(const Vertex<F, kFeatures>& v, const Frame<F>& frame, const Vec3<F>& wo,
                           const VertexResult<F>& out) {
@@ -30,8 +31,8 @@ inline UInt<F> crossed_at(const Vertex<F, kFeatures>& v, const Frame<F>& frame, 
          bit(out.has_shadow & crosses(out.shadow_d), kShadowCrosses);
 }
 
-/// Runs the steps of a vertex for the active lanes' paths, all with shading program `Bsdf`. `joint`
-/// couples the paths to a joint transport (joint_transport.h).
+/// Runs the steps of a vertex for the paths in active lanes. All these vertices have the shading
+/// program `Bsdf`. `joint` couples the paths to a joint transport (joint_transport.h).
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Coupling>
 WAVECOMB_INLINE VertexResult<F> vertex_steps(const Vertex<F, kFeatures>& v, Coupling& joint) {
   using U = UInt<F>;

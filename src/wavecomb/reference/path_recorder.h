@@ -15,7 +15,7 @@
 
 namespace wavecomb {
 
-/// Base of PathTracer: state, radiance and AOVs of the current path.
+/// Base class of PathTracer, which holds the state, radiance and AOVs of the current path.
 class PathRecorder {
  protected:
   using F = float;
@@ -51,7 +51,8 @@ class PathRecorder {
     add(hit.geom, shape_emission<F>(scene, settings_, depth, hit.geom, hit.t, path, true));
   }
 
-  /// Records for AOVs a camera ray along `dir` that hits a surface, or a volume event, at `p`.
+  /// Records the first hit of a camera ray for AOVs. The ray with direction `dir` has hit a surface
+  /// or a volume event at `p`.
   void note_first_hit(const Vec3<F>& dir, const Vec3<F>& p, const SingleHit& hit, uint32_t mesh,
                       uint32_t material) {
     const CameraSetup& camera = *context_.camera;
@@ -92,15 +93,16 @@ class PathRecorder {
     radiance_.sum += c;
     if (aovs_.wants_lights()) aovs_.add_volume_emission<F>(kSlot, c, true);
   }
-  /// Records the ray segment for AOVs. `throughput` is the throughput of the path after the flight.
+  /// Records a ray segment with its free flight for AOVs. `throughput` is the throughput of the
+  /// path after the flight.
   void record_segment(uint32_t depth, const Flight<F>& flight, const Color<F>& throughput) {
     const bool straight = !flight.stopped && !flight.has_scattered;
     if (depth == 0 && aovs_.wants_transmittance())
       aovs_.pass<F>(kSlot, straight ? throughput : Color<F>(0.f), true);
     if (aovs_.expressions() && flight.has_scattered) aovs_.expressions().walk<F>(kSlot, true);
   }
-  /// Returns the volume, or the mesh filled with a medium, whose event `material` has stopped the
-  /// path.
+  /// Returns the volume or mesh whose medium has scattered the path. `material` is the material of
+  /// the volume event.
   VolumeHit<F> volume_hit(uint32_t material) const {
     const SceneView& scene = context_.scene;
     if (context_.has_medium_stack() && material == scene.nested_media.event_material)

@@ -18,16 +18,17 @@
 
 namespace wavecomb {
 
-/// Functions by which a joint transport (path/joint_transport.h) takes part in the camera paths of
-/// the reference integrator. This class, for renders without a joint transport, does nothing.
+/// Interface through which a joint transport (path/joint_transport.h) adds to the camera paths of
+/// the reference integrator. This implementation, for renders without a joint transport, does
+/// nothing.
 struct NoJointTracer {
   NoJointTracer(const WaveContext& /*context*/, ReferenceWorker& /*worker*/) {}
   /// Begins a camera path. An implementation may trace the light paths that the camera path needs.
   void begin(uint32_t /*pixel*/, uint32_t /*sample*/) {}
-  /// Uses the path's vertex at `depth`, after its shadow ray was traced. `rays` traces the rays of
-  /// the path. Returns a contribution to the path's radiance.
+  /// Processes the path vertex at `depth` after its shadow ray was traced, and returns the joint
+  /// transport's contribution to the radiance of the path. `rays` traces the rays of the path.
   Color<float> use_vertex(uint32_t /*depth*/, SingleRays& /*rays*/) { return Color<float>(0.f); }
-  /// Ends a path that was added to pixel `index` of the film.
+  /// Ends a path whose radiance was added to the film pixel with the given index.
   void end(size_t /*index*/) {}
   void end_task(const WaveTask& /*task*/) {}
 };
@@ -63,7 +64,7 @@ class PathTracer : PathRecorder {
     }
     return radiance_.sum;
   }
-  /// Traces a path only to record the lights that its vertices sample, as path `path` of `out`.
+  /// Traces a path, and stores the lights that its vertices sample in `out`, at path index `path`.
   void probe(uint32_t pixel, uint32_t sample, size_t path, LightProbes& out) {
     probes_ = {out.probes.data() + path * out.most, out.most};
     probe_count_ = 0;
@@ -76,7 +77,7 @@ class PathTracer : PathRecorder {
   const float* radiance() const { return reinterpret_cast<const float*>(&radiance_); }
 
  private:
-  /// Traces one camera path. Returns the first depth for which end_depth() has not stored the
+  /// Traces one camera path. Returns the number of depths for which end_depth() has stored the
   /// radiance.
   uint32_t trace_path(uint32_t pixel, uint32_t sample) {
     const SceneView& scene = context_.scene;
@@ -166,8 +167,8 @@ class PathTracer : PathRecorder {
     return ray;
   }
 
-  /// Adds the emission of volumes along the ray of a path, and samples its free flight to `hit`,
-  /// which becomes the volume event if an event stops the flight.
+  /// Adds the emission of volumes along the ray of a path, and samples its free flight to `hit`. If
+  /// a volume event stops the flight, `hit` is replaced by the event.
   void pass_media(const SampleKey<F>& key, uint32_t depth, PathState<F>& path, SingleHit& hit) {
     const Flight<F> flight = sample_flight(key, depth, path, hit);
     if constexpr (Media::kHasEmission)
@@ -204,8 +205,8 @@ class PathTracer : PathRecorder {
     return is_free;
   }
 
-  /// Continues a ray that has entered a subsurface body as a random walk. A ray that hits no
-  /// surface of that body continues unchanged. Sets `left_body` if the walk has left the body.
+  /// Runs the subsurface random walk of a ray that has entered a body. If the ray does not hit the
+  /// body again, it continues as a normal ray. Sets `left_body` if the walk has left the body.
   /// Returns false if the path is terminated.
   bool walk(const SampleKey<F>& key, uint32_t depth, PathState<F>& path, SingleHit& hit,
             bool& left_body) {
@@ -239,9 +240,9 @@ class PathTracer : PathRecorder {
                                             true);
   }
 
-  /// Adds the light sample of `v`, whose light is in `group`. Volumes always attenuate the light
-  /// sample, and media inside meshes do if the shadow ray is free. If an object blocks the ray,
-  /// only the fraction v.shadow_tint (the shadow colour of the light) remains.
+  /// Adds the contribution of the light sample in `v` to the light group `group`. Volumes always
+  /// attenuate the contribution. Media inside meshes attenuate it only if the shadow ray is free.
+  /// If an object blocks the shadow ray, the contribution is multiplied by `v.shadow_tint`.
   void add_direct(const SampleKey<F>& key, uint32_t depth, const VertexResult<F>& v, bool is_free,
                   uint32_t group) {
     Color<F> c = v.direct;

@@ -30,13 +30,14 @@ class ReferenceIntegrator final : public Integrator {
 /// Result of sampling a light at a vertex.
 struct LightProbe {
   uint32_t light;  ///< kNoLight if the light tree selected none
-  /// Luminance of the contribution of an unblocked light sample, 0 if blocked, and its MIS weight.
+  /// `value` is the luminance of the light sample's contribution, or 0 if the shadow ray was
+  /// blocked. `weight` is the MIS weight of the light sample.
   float value, weight;
   float at[3];  ///< position of the LightReceiver
   uint32_t normal;
 };
 
-/// Lights that paths have sampled, at most `most` for each path.
+/// Light samples of paths, with at most `most` samples for each path.
 struct LightProbes {
   LightProbes(size_t paths, uint32_t most_)
       : most(most_), probes(paths * most_), counts(paths, 0), luminance(paths, 0.f) {}

@@ -10,7 +10,7 @@
 
 namespace wavecomb {
 
-/// Slot of the path that is traced.
+/// Slot index of the path that is being traced.
 inline constexpr uint32_t kOnlySlot = 0;
 
 struct SingleHit {
@@ -19,7 +19,7 @@ struct SingleHit {
   uint32_t event_material;  ///< valid if inst is kNoSurface
 };
 
-/// Traces the rays of one path after the other.
+/// Traces rays for the paths of the reference integrator, which are traced one after the other.
 class SingleRays {
  public:
   SingleRays(const WaveContext& context, Counts& counts, PathAovs& aovs)
@@ -31,7 +31,7 @@ class SingleRays {
     time_ = time;
   }
   float time() const { return time_; }
-  /// Returns the keys of the last ray.
+  /// Returns the presence keys of the last ray.
   const PresenceKeys& keys() const { return keys_; }
 
   SingleHit intersect(const Vec3<float>& o, const Vec3<float>& d, float tfar, uint32_t depth) {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Registration of the joint transport (path/joint_transport.h) in the plan, the pilots and the
-/// passes of a render, and of the pilot that chooses between joint transport and camera paths
-/// alone.
+/// Registers light paths as the joint transport (path/joint_transport.h) of renders. The types
+/// below are the joint transport's parts of the plan, the pilot renders and the passes.
 #pragma once
 
 #include "wavecomb/light_paths/render/light_aiming.h"
@@ -12,7 +11,7 @@ namespace wavecomb {
 
 using JointShare = LightPathShare;    ///< number of light paths per camera path
 using JointPlan = LightPathPlan;      ///< part of a RenderPlan
-using JointPilot = LightPathPilot;    ///< the joint transport's pilot in run_pilots()
-using JointPasses = LightPathPasses;  ///< the joint transport's passes in a PassLoop
+using JointPilot = LightPathPilot;    ///< pilot render of the joint transport, run by run_pilots()
+using JointPasses = LightPathPasses;  ///< passes of the joint transport, run by a PassLoop
 
 }  // namespace wavecomb

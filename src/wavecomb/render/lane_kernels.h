@@ -11,7 +11,7 @@
 
 namespace wavecomb {
 
-/// Kernels for one lane width.
+/// Wave kernels for one lane width.
 struct LaneKernels {
   using RunWave = void (*)(Wave&, const WaveContext&, const WaveTask&);
   RunWave run = nullptr;
@@ -19,12 +19,13 @@ struct LaneKernels {
   double (*time_material)(Wave&, const WaveContext&, const CalibrationHits&) = nullptr;
 };
 
-/// Returns the kernels for a lane width. All pointers are null if this build has none.
+/// Returns the kernels for a lane width. All pointers are null if this build has no kernels for the
+/// width.
 LaneKernels lane_kernels(uint32_t lanes);
 /// Returns the lane widths of this build in ascending order.
 std::vector<uint32_t> lane_widths();
-/// Returns the lane width to use: `wanted`, or the widest for 0. Throws Error for a width that this
-/// build does not have.
+/// Returns the lane width to use, which is `wanted` or, if `wanted` is 0, the widest lane width of
+/// this build. Throws Error for a width that this build does not have.
 uint32_t choose_lanes(uint32_t wanted);
 /// Creates the wavefront integrator with `lanes` lanes, or the scalar reference integrator.
 std::unique_ptr<Integrator> make_integrator(IntegratorKind kind, const WaveContext& context,

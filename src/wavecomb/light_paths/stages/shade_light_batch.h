@@ -7,7 +7,8 @@
 
 namespace wavecomb {
 
-/// Runs the shading steps of a light path vertex, inlined as in shade_one().
+/// Runs the shading steps of a packet of light path vertices. The function is inlined into the loop
+/// of shade_light_batch().
 template <typename Bsdf, typename F, uint32_t kFeatures>
 WAVECOMB_INLINE LightVertexResult<F> shade_one_of_light(const Vertex<F, kFeatures>& v,
                                                         const LightPathState<F>& from,
@@ -19,9 +20,9 @@ WAVECOMB_INLINE LightVertexResult<F> shade_one_of_light(const Vertex<F, kFeature
     return light_path_steps<Bsdf, F>(v, from, setup, target);
 }
 
-/// Shades the light path records [begin, end) of the shading order, as shade_batch() does for
-/// camera paths; LightPathBuffers::use defines the purpose. The words `group` and `set` of the
-/// ShadowRow hold the film position (x, y) of the contribution.
+/// Shades the queued hits [begin, end) of light paths, in the order of the shading queue.
+/// LightPathBuffers::use says what the light paths are traced for. For connections to the camera,
+/// the fields `group` and `set` of ShadowRow hold the film position (x, y) of the contribution.
 template <typename Bsdf, typename F, uint32_t kFeatures>
 void shade_light_batch(Wave& wave, const WaveContext& context, const ShadeSettings& settings,
                        uint32_t depth, size_t begin, size_t end) {

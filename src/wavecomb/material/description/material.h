@@ -18,8 +18,9 @@ namespace wavecomb {
 
 /// Material parameters that a texture can drive. Inputs without a texture use a constant.
 enum class Input : uint8_t {
-  kBaseColor,  ///< RGB; albedo; reflectance at normal incidence (F0) of metal; tint of dielectrics
-  /// RGB; tint at 82 degrees (F82) of metal; F0 of principled with specular workflow.
+  /// RGB: albedo, F0 of metals (reflectance at normal incidence), or tint of dielectrics.
+  kBaseColor,
+  /// RGB: tint at 82 degrees (F82) of metals, or F0 of "principled" with specular workflow.
   kSpecularColor,
   kEmission,   ///< RGB radiance
   kRoughness,  ///< perceptual; alpha = roughness^2
@@ -27,7 +28,7 @@ enum class Input : uint8_t {
   kClearcoat,
   kClearcoatRoughness,
   kOpacity,
-  kNormal,  ///< tangent-space normal, already scaled and biased to [-1, 1]
+  kNormal,  ///< tangent-space normal, with components in [-1, 1]
 };
 inline constexpr uint32_t kInputCount = 9;
 inline constexpr const char* kInputNames[kInputCount] = {
@@ -40,7 +41,7 @@ inline constexpr uint32_t input_bit(Input s) {
 /// A texture connected to an input: value = texel * scale + bias at uv' = transform(uv).
 struct TextureUse {
   uint32_t texture = kNoTexture;
-  /// Channel to read: 0 to 3 use one channel for r, g and b; 4 uses RGB.
+  /// Texture channel: 0 to 3 read a single channel for r, g and b; 4 reads RGB.
   uint32_t channel = 4;
   std::array<float, 4> scale{1, 1, 1, 1}, bias{0, 0, 0, 0};
   /// u' = m[0] u + m[1] v + m[2]; v' = m[3] u + m[4] v + m[5].
@@ -60,20 +61,23 @@ struct Material {
   float clearcoat_roughness = 0.01f;
   float opacity = 1;
   float ior = 1.5f;
-  /// If above 0, opacity below the threshold counts as 0 and other opacity as 1.
+  /// If the threshold is above 0, opacity below it is replaced by 0, and any other opacity by 1.
   float opacity_threshold = 0;
-  /// Measured complex index of refraction of a conductor (metal only), used instead of F0 and F82
-  /// if any component of k is > 0.
+  /// Measured complex index of refraction, for the program "metal". If any component of
+  /// `conductor_k` is above 0, the index replaces F0 and F82.
   Vec3<float> conductor_eta{0, 0, 0}, conductor_k{0, 0, 0};
-  bool specular_workflow = false;  ///< principled: F0 comes from specular_color instead of metallic
-  bool presence = false;  ///< principled: opacity is presence (cut-out) instead of transparency
+  /// For "principled": `specular_color` gives F0, and `metallic` is ignored.
+  bool specular_workflow = false;
+  /// For "principled": opacity cuts out the surface instead of making it transparent.
+  bool presence = false;
   std::array<TextureUse, kInputCount> textures;
-  OpenPbr openpbr;  ///< inputs that only the program openpbr uses
-  /// Values of the parameters specific to the program (ProgramInfo::own), if given.
+  OpenPbr openpbr;  ///< inputs that only the program "openpbr" uses
+  /// Values of the program-specific parameters that ProgramInfo::own lists; empty entries use the
+  /// default.
   std::array<std::optional<float>, kMaxProgramParameters> own;
-  /// Value graphs that compute parameters at hits, instead of constants and textures: ids of
-  /// SceneBuilder::add_graph, or kNoGraph. The graphs for opacity and emission repeat the relevant
-  /// parts of `graph`, so that shadow rays and light samples evaluate nothing else.
+  /// Ids of the value graphs that compute parameters at hits, from SceneBuilder::add_graph(), or
+  /// kNoGraph. The graphs for opacity and emission repeat the relevant parts of `graph`, so that
+  /// shadow rays and light samples evaluate nothing else.
   uint32_t graph = kNoGraph, opacity_graph = kNoGraph, emission_graph = kNoGraph;
 
   /// Returns program-specific parameter `i`.
@@ -82,8 +86,8 @@ struct Material {
     return specific_value(i);
   }
   bool has_texture(Input s) const { return textures[static_cast<size_t>(s)].texture != kNoTexture; }
-  /// Returns whether the material can emit: its program reads the emission input, which is not
-  /// zero.
+  /// Returns whether the material can emit light. The program must read the emission input, and the
+  /// input must not be zero.
   bool emits() const {
     return can_emit(program) && (emission.x > 0 || emission.y > 0 || emission.z > 0 ||
                                  has_texture(Input::kEmission) || emission_graph != kNoGraph);
@@ -104,17 +108,18 @@ struct alignas(64) MaterialRecord {
   float normal[3];
   float ior, opacity_threshold;
   float conductor_eta[3], conductor_k[3];
-  uint32_t textured_inputs;  ///< bit s: input s reads a texture
+  uint32_t textured_inputs;  ///< bit `s` is set if input `s` reads a texture
   uint32_t flags;            ///< MaterialFlags
   uint32_t program;
   uint32_t openpbr;  ///< index of the material's OpenPbrRecord
   uint32_t graph = kNoGraph, opacity_graph = kNoGraph, emission_graph = kNoGraph;
 };
 static_assert(sizeof(MaterialRecord) == 128);
-/// Additional bit of MaterialRecord::textured_inputs: the program needs a tangent frame along the
-/// texture's u, even if the material has no texture.
+/// Additional bit of MaterialRecord::textured_inputs. The bit is set if the program needs a tangent
+/// frame along the u axis of texture space, even if the material has no texture.
 inline constexpr uint32_t kNeedsTangent = 1u << 31;
-/// Bits of MaterialRecord::textured_inputs: a graph drives parameters; a graph drives the normal.
+/// Bits of MaterialRecord::textured_inputs. `kReadsGraph` means that a value graph drives
+/// parameters, and `kGraphNormal` that a value graph drives the normal.
 inline constexpr uint32_t kReadsGraph = 1u << 30, kGraphNormal = 1u << 29;
 enum MaterialFlags : uint32_t {
   kSpecularWorkflow = 1,
@@ -123,7 +128,7 @@ enum MaterialFlags : uint32_t {
   kEmits = 8,
   kHasGraph = 16,
 };
-/// Packed TextureUse: 16 32-bit words.
+/// Packed TextureUse of 64 bytes.
 struct alignas(64) TextureUseRecord {
   uint32_t texture, channel;
   float scale[4], bias[4], uv[6];

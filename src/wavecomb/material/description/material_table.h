@@ -17,7 +17,7 @@
 
 namespace wavecomb {
 
-/// A parameter specific to one program: number `index` of ProgramInfo::own.
+/// A parameter of one program only, at position `index` in ProgramInfo::own.
 struct SpecificParameter {
   ProgramId program;
   size_t index;
@@ -26,13 +26,14 @@ struct SpecificParameter {
   const ProgramParameter& info() const { return info_of(program).own[index]; }
 };
 
-/// Description of a material parameter. Contract: descriptions have static lifetime.
+/// Row of the table: a material parameter. Rows have static lifetime.
 struct MaterialParameter {
-  const char* name;  ///< keyword of add_material
+  const char* name;  ///< keyword argument of SceneBuilder.add_material() in Python
   std::variant<float Material::*, Vec3<float> Material::*, bool Material::*, SpecificParameter>
       accessor;
 
-  /// Null if materials of any program have the parameter.
+  /// Returns the program and index of a program-specific parameter, or null for a member of
+  /// Material.
   const SpecificParameter* own() const { return std::get_if<SpecificParameter>(&accessor); }
 };
 
@@ -41,8 +42,8 @@ struct MaterialParameter {
 /// specific to a program come last, and are hashed only if they differ from the default.
 std::span<const MaterialParameter> material_table();
 
-/// Calls visit(row, value) for each parameter of a material (const or not) of type `Value`: float,
-/// Vec3<float> or bool. Parameters specific to other programs are skipped.
+/// Calls visit(row, value) for each parameter of type `Value` (float, Vec3<float> or bool).
+/// `material` may be const. Parameters that are specific to another program are skipped.
 template <typename Value, typename Object, typename Visit>
 void for_each_parameter(Object& material, const Visit& visit) {
   for (const MaterialParameter& p : material_table()) {

@@ -10,10 +10,10 @@
 #include "wavecomb/core/rows/fields.h"
 #include "wavecomb/core/vec3.h"
 
-/// X(kind, name, default, least, most), in the order of records and of graph outputs. The defaults
-/// are those of OpenPBR Surface 1.1, except for the weights of its inputs. Inputs of kind Derived
-/// are colours that kernels and graphs use, but that callers cannot set: they are computed from
-/// other parameters.
+/// List of inputs as X(kind, name, default, minimum, maximum), in the order in which OpenPbrRecord
+/// and the outputs of value graphs store them. Default values follow OpenPBR Surface 1.1, except
+/// for the inputs that are weights. Inputs of kind Derived are colours that kernels and graphs use,
+/// but that callers cannot set: they are computed from other parameters.
 ///
 ///   specular_weight        scales the reflectance at normal incidence
 ///   anisotropy, rotation   of specular roughness; rotation in turns from the tangent towards the
@@ -76,10 +76,10 @@ struct OpenPbrInputs {
 #undef WAVECOMB_NAME
 };
 
-/// OpenPBR inputs as callers set them.
+/// OpenPBR inputs of a material, set by callers of SceneBuilder.
 struct OpenPbr : OpenPbrInputs<float> {
-  /// If transmission_depth is above 0, transmission_color is the transmittance of a path of that
-  /// length inside; otherwise the colour tints each crossing.
+  /// If `transmission_depth` is above 0, `transmission_color` is the transmittance over that
+  /// distance inside the object. Otherwise the colour tints light at each crossing of the surface.
   Vec3<float> transmission_color{1, 1, 1};
   float transmission_depth = 0;
   /// Scattering coefficient inside the solid, multiplied by transmission_depth, and the mean cosine
@@ -100,7 +100,7 @@ struct OpenPbr : OpenPbrInputs<float> {
   }
 };
 
-/// Packed OpenPBR inputs: 32 32-bit words.
+/// Packed OpenPBR inputs of 128 bytes.
 struct alignas(64) OpenPbrRecord : OpenPbrInputs<float> {
   float thin_walled;  ///< 0 or 1
   float subsurface;   ///< SubsurfaceKind

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Shading programs, of which each material uses one. Ids, names, kernels, the parameters of
-/// materials, and compile units are derived from this list.
+/// List of shading programs. A shading program is the code that shades hits of a material, and each
+/// material uses one program. Ids, names, kernels, material parameters and compile units are
+/// derived from this list.
 #pragma once
 
 #include <array>
@@ -24,20 +25,22 @@ struct ProgramParameter {
 /// and never a program's name, so that a new program only needs a table row and a BSDF.
 namespace program_trait {
 inline constexpr uint32_t kEmits = 1;  ///< reads the emission input
-/// A roughness input near 0 makes its lobes sharp enough to focus light.
+/// The program has a roughness input. A low roughness gives lobes that can focus light into
+/// caustics.
 inline constexpr uint32_t kGlossy = 2;
-/// Smooth glass: refracts without a roughness input.
+/// All materials of the program refract light, as glass does.
 inline constexpr uint32_t kGlass = 4;
 /// Shades curves as whole fibres: the BSDF includes scattering inside the fibre, so rays hit such
 /// meshes only from outside (accel/presence.h).
 inline constexpr uint32_t kFibre = 8;
 /// The BSDF transmits light where opacity is below 1, unless the material uses opacity as presence.
 inline constexpr uint32_t kTransmitsByOpacity = 16;
-/// Has the inputs of WAVECOMB_OPENPBR_INPUTS and the OpenPBR layers, which use energy tables.
+/// The program has the inputs of WAVECOMB_OPENPBR_INPUTS, and its OpenPBR layers need energy
+/// tables.
 inline constexpr uint32_t kLayered = 32;
-/// Closed meshes may bound a medium, with priorities of nested dielectrics.
+/// Closed meshes with the program may bound a medium, and have a priority for nested dielectrics.
 inline constexpr uint32_t kNests = 64;
-inline constexpr uint32_t kSubsurface = 128;  ///< may have subsurface random walks
+inline constexpr uint32_t kSubsurface = 128;  ///< materials may have subsurface random walks
 }  // namespace program_trait
 
 /// One row for each program:
@@ -74,7 +77,7 @@ enum class ProgramId : uint8_t {
 struct ProgramInfo {
   const char* name;
   uint32_t traits;  ///< bits of program_trait
-  float model_ns;   ///< estimated cost of each record
+  float model_ns;   ///< estimated cost of shading one queued hit, in nanoseconds
   std::array<ProgramParameter, kMaxProgramParameters> own;
 
   constexpr size_t specific_count() const {

@@ -45,8 +45,9 @@ bool is_color(Input input) {
   return input == Input::kBaseColor || input == Input::kSpecularColor || input == Input::kEmission;
 }
 
-/// Returns the value of an input of `count` components, starting at component `first` of
-/// GraphParameter, if a graph gives all of them a single value for all hits.
+/// Returns the constant value that a graph gives to a material input, or an empty value if the
+/// graph can give different values at different hits. The input has `count` components, from
+/// `first` on in GraphParameter.
 std::optional<Vec3<float>> only_value(const DrivenRanges& ranges, uint32_t first, uint32_t count) {
   float value[3] = {0, 0, 0};
   for (uint32_t c = 0; c < count; ++c) {
@@ -65,7 +66,8 @@ InputRange input_range(Input input, const TextureUse& use, const Texture& textur
   float low[3], high[3];
   for (uint32_t c = 0; c < 3; ++c) {
     const uint32_t from = use.channel < 4 ? use.channel : c;
-    // Kernels use the same fma. Its rounding is monotonic, so the range holds for all texels.
+    // Kernels compute the input with the same fused multiply-add. Its rounding is monotonic, so the
+    // results for the smallest and the largest texel bound those of all texels.
     const auto at = [&](float texel) { return fma(texel, use.scale[from], use.bias[from]); };
     const auto [least, most] = std::minmax({at(texels.low[from]), at(texels.high[from])});
     const uint32_t component = first + (is_color(input) || input == Input::kNormal ? c : 0);
@@ -87,7 +89,8 @@ Material simplified(Material m, const GraphSet& graphs, std::span<const TextureP
   for (uint32_t s = 0; s < kInputCount; ++s) {
     const auto input = static_cast<Input>(s);
     const TextureUse& use = m.textures[s];
-    // A constant normal map stays, since shading uses a different tangent frame without it.
+    // Keep a constant normal map, since a material without a normal map is shaded with a different
+    // tangent frame.
     if (use.texture >= textures.size() || input == Input::kNormal) continue;
     const auto [low, high] = input_range(input, use, *textures[use.texture]);
     const bool same = low.x == high.x && (!is_color(input) || (low.y == high.y && low.z == high.z));

@@ -9,7 +9,7 @@
 
 namespace wavecomb {
 
-/// Range of each component of an input.
+/// Range of values of a material input, for each component.
 struct InputRange {
   Vec3<float> low, high;
 };
@@ -19,9 +19,9 @@ struct InputRange {
 /// normalize it instead.
 InputRange input_range(Input input, const TextureUse& use, const Texture& texture);
 
-/// Returns `material` with every texture that has the same value everywhere replaced by a constant,
-/// and with opacity and emission graphs that can give only one value replaced by it. Shading
-/// results are identical, with fewer texture lookups. If no texture is left, shading uses a
+/// Returns a simplified copy of `material`. Every texture with the same value at all texels, and
+/// every opacity or emission graph with a single possible result, is replaced by a constant.
+/// Shading results are identical, with fewer texture lookups. If no texture is left, shading uses a
 /// different tangent frame, so that individual samples differ while their expectation stays the
 /// same.
 Material simplified(Material material, const GraphSet& graphs,

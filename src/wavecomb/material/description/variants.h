@@ -27,9 +27,9 @@ inline constexpr uint32_t kAllParts = kTexturePart | kEmissionPart | kMetalPart 
                                       kTransmissionPart | kBackDiffusePart | kFuzzPart | kFilmPart |
                                       kAnisotropyPart;
 
-/// Reduced variants: X(name, program, parts), in ascending order of cost. A material uses the first
-/// variant that has all features of the material. CMake reads this list as well and makes a compile
-/// unit for each row.
+/// List of reduced variants as X(name, program, parts), where `parts` are the features that the
+/// variant supports, in ascending order of cost. A material uses the first variant that has all
+/// features of the material. CMake reads this list as well and makes a compile unit for each row.
 #define WAVECOMB_VARIANTS(X)                               \
   X(gloss, principled, 0)                                  \
   X(tinted_gloss, principled, kMetalPart)                  \
@@ -43,7 +43,7 @@ struct Variant {
   const char* program;
   uint32_t parts;
 };
-/// All variants: first the complete programs, in the order of ProgramId.
+/// List of all variants. The complete programs come first, in the order of ProgramId.
 inline constexpr Variant kVariants[] = {
 #define WAVECOMB_PROGRAM(name, ...) {#name, #name, kAllParts},
     WAVECOMB_PROGRAMS(WAVECOMB_PROGRAM, WAVECOMB_PROGRAM) WAVECOMB_MEDIUM_PROGRAMS(WAVECOMB_PROGRAM)
@@ -54,8 +54,8 @@ inline constexpr Variant kVariants[] = {
 };
 inline constexpr uint32_t kVariantCount = sizeof(kVariants) / sizeof(Variant);
 
-/// Returns the id of the program called `name`. An unknown name is not a constant expression, so it
-/// fails to compile.
+/// Returns the id of the program called `name`. A call with an unknown name does not compile,
+/// because the function must be a constant expression.
 constexpr ProgramId program_id(std::string_view name) {
   uint32_t i = 0;
   while (name != kProgramNames[i]) ++i;

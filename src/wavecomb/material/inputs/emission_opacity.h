@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Emission and opacity of materials at hits. All callers get the same values; shading reads its
-/// own emission from the same inputs and graphs (material/params.h).
+/// Emission and opacity of materials at hits. Traversal and light sampling call these functions.
+/// Shading evaluates the emission of its hits by material/params.h, from the same inputs and
+/// graphs.
 ///
 /// Graphs override textures, and textures override constants, for each component.
 #pragma once
@@ -12,7 +13,7 @@ namespace wavecomb {
 
 namespace detail {
 
-/// Graph inputs where only texture coordinates are known.
+/// Makes the inputs of a value graph at a point of which only the texture coordinates are known.
 template <typename F>
 struct UvOnly {
   const Vec2<F>& uv;
@@ -49,9 +50,10 @@ inline Color<F> fetch_emission(const MaterialView& view, const UInt<F>& material
   return fetch_emission<F>(view, material, uv, footprint, detail::UvOnly<F>{uv, footprint}, active);
 }
 
-/// Returns the presence of the surface at `uv`, the probability that a ray hits it. Presence is 0
-/// or 1 with an opacity threshold, and 1 for materials whose opacity is transparency, which the
-/// program handles. `make_point` has the same role as in fetch_emission.
+/// Returns the presence of the surface at `uv`, the probability that a ray hits it. With an opacity
+/// threshold, presence is 0 or 1. If opacity means transparency, presence is 1 and the shading
+/// program handles the transparency. `make_point(active)` returns the inputs of the graph, and is
+/// called only if there is a graph.
 template <typename F, typename MakePoint>
 inline F fetch_opacity(const MaterialView& view, const UInt<F>& material, const Vec2<F>& uv,
                        const Footprint<F>& footprint, const MakePoint& make_point,

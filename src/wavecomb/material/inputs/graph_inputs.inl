@@ -38,7 +38,7 @@ template <typename F>
   detail::InstanceMaps<F> maps(scene.instances, hit.inst, active);
   if (scene.has_motion)
     maps.set_instance(moved_instance<F>(scene, hit.inst, hit.time, maps, Vec3<F>(F(0.f)), active));
-  // Inverse of the transform by cofactors.
+  // Invert the instance transform by cofactors.
   const Vec3<F>* m = maps.row;
   const Vec3<F> c[3] = {cross(m[1], m[2]), cross(m[2], m[0]), cross(m[0], m[1])};
   const F det = dot(m[0], c[0]), inv = 1.f / select(det == 0.f, F(1.f), det);

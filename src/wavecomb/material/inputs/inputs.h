@@ -15,12 +15,13 @@ inline constexpr float kMaxEmission = 1e18f;
 
 namespace detail {
 
-/// Returns texel * scale + bias of the chosen channels of an input's texture.
+/// Returns the texture value of a material input: texel * scale + bias, for the channels that the
+/// TextureUse selects.
 template <typename F>
 Vec3<F> read_texture(const MaterialView& view, const RecordReader<F>& use, const Vec2<F>& uv,
                      const Footprint<F>& footprint, const Mask<F>& active);
 
-/// Values of material inputs at a hit.
+/// Reads the values of material inputs at a hit.
 template <typename F>
 struct InputReader {
   const MaterialView& view;

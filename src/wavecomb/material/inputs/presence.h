@@ -9,8 +9,8 @@
 
 namespace wavecomb {
 
-/// Returns the lanes whose materials need a presence lookup: their opacity is presence and below 1
-/// somewhere.
+/// Returns the lanes whose materials are cut out by opacity, so that the presence of the surface
+/// must be looked up.
 template <typename F>
 inline Mask<F> has_presence(const MaterialView& view, const UInt<F>& material,
                             const Mask<F>& active) {
@@ -19,9 +19,10 @@ inline Mask<F> has_presence(const MaterialView& view, const UInt<F>& material,
   return active & Mask<F>((flags & uint32_t{kPresence}) != U(0u));
 }
 
-/// Makes the inputs of graphs at a point of a mesh without a path: on triangles, the position at
-/// rest and the plane's normal as normal and viewing direction; on curves and points, only texture
-/// coordinates. Images are read at their finest level.
+/// Makes the inputs of a value graph at a point of a mesh that no path has hit. On triangles, the
+/// inputs are the position without motion, and the geometric normal as normal and as viewing
+/// direction. On curves and points, the inputs are only the texture coordinates. Images are read at
+/// their finest level.
 template <typename F>
 [[gnu::noinline, gnu::cold]] GraphPoint<F> point_at_rest(const MeshRecord* meshes,
                                                          const InstanceRecord* instances,

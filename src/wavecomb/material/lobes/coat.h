@@ -26,9 +26,9 @@ inline F average_fresnel_dielectric(const F& eta) {
   return clamp(fma(p, x, F(-3.3e-4f)), F(0.f), F(1.f));
 }
 
-/// Reflectance F0 + (1 - F0) w(c) of a coat with index >= 1. `exact` = 0 selects Schlick's w =
-/// (1-c)^5, and `exact` = 1 the exact Fresnel curve, w = (F_exact - f) / (1 - f) with f =
-/// F_exact(1); values between blend them.
+/// Reflectance F0 + (1 - F0) w(c) of a coat with index >= 1. With `exact` = 0, w is Schlick's (1 -
+/// c)^5. With `exact` = 1, w follows the exact Fresnel curve: w = (F_exact - f) / (1 - f) with f =
+/// F_exact(1). Values of `exact` between 0 and 1 blend the two curves.
 template <typename F>
 struct CoatFresnel {
   F ior;
@@ -79,7 +79,8 @@ inline F coat_transmission(const F& f_o, const F& f_i, const F& f_avg) {
   return F(1.f - f_o) * F(1.f - f_i) / max(F(1.f - f_avg), F(1e-4f));
 }
 
-/// Factor of coat_transmission that does not depend on the light: (1 - f_o) / (1 - f_avg).
+/// Factor of coat_transmission() that does not depend on the light direction: (1 - f_o) / (1 -
+/// f_avg).
 template <typename F>
 inline F coat_view_factor(const F& f_o, const F& f_avg) {
   return F(1.f - f_o) / max(F(1.f - f_avg), F(1e-4f));

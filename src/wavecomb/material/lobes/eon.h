@@ -8,7 +8,7 @@
 
 namespace wavecomb {
 
-/// Rotation about z into the frame whose xz plane contains w.
+/// Rotation about the z axis into the frame whose xz plane contains the direction `w`.
 template <typename F>
 struct AzimuthFrame {
   F c, s;
@@ -28,9 +28,10 @@ struct AzimuthFrame {
   }
 };
 
-/// EON for a roughness in [0, 1]; both directions above the surface. Roughness 0 is Lambertian.
-/// With a white colour the directional albedo is 1: the fit E of single scattering is used both in
-/// the multiple-scattering lobe and in its normalisation. The error of this fit is below 0.1 %.
+/// EON diffuse lobe for a roughness in [0, 1], with both directions above the surface. Roughness 0
+/// is Lambertian. With a white colour the directional albedo is 1: the fit E of single scattering
+/// is used both in the multiple-scattering lobe and in its normalisation. The error of this fit is
+/// below 0.1 %.
 template <typename F>
 struct EonDiffuse {
   F roughness, a, average;  ///< coefficient A of Fujii's model, and its mean albedo

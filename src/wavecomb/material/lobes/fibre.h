@@ -135,12 +135,13 @@ inline F fibre_color_divisor(const F& r) {
 template <typename F>
 struct Fibre {
   F ior;
-  Color<F> absorption;        ///< per fibre radius
-  std::array<F, 3> variance;  ///< longitudinal: R, TT, and TRT with all further lobes
-  F scale;                    ///< azimuthal scale
-  F tilt;                     ///< angle of the cuticle scales towards the root, in turns (1 = 360
-                              ///< degrees)
-  std::array<F, 3> tint;      ///< factors of R, TT, and TRT with all further lobes
+  Color<F> absorption;  ///< per fibre radius
+  /// Longitudinal variance of R, of TT, and of TRT with all further lobes.
+  std::array<F, 3> variance;
+  F scale;                ///< azimuthal scale
+  F tilt;                 ///< angle of the cuticle scales towards the root, in turns (1 = 360
+                          ///< degrees)
+  std::array<F, 3> tint;  ///< tint of R, of TT, and of TRT with all further lobes
 
   static constexpr size_t kLobes = 4;
 
@@ -148,10 +149,10 @@ struct Fibre {
   struct View {
     F sin_o, cos_o, y, z;  ///< sine and cosine of theta_o; y and z of the unit
                            ///< azimuthal direction of wo
-    std::array<F, kLobes> sin_tilted, cos_tilted, share;  ///< share: sampling probability of each
-                                                          ///< lobe
-    std::array<Color<F>, kLobes> passed;                  ///< A_p including the tint
-    std::array<F, 3> turn;                                ///< azimuth of the centre of N_p
+    /// `share` is the sampling probability of each lobe.
+    std::array<F, kLobes> sin_tilted, cos_tilted, share;
+    std::array<Color<F>, kLobes> passed;  ///< A_p including the tint
+    std::array<F, 3> turn;                ///< azimuth of the centre of N_p
   };
 
   View view(const Vec3<F>& wo) const;
@@ -236,7 +237,8 @@ inline void Fibre<F>::eval(const View& v, const Vec3<F>& wi, Color<F>& f_cos, F&
   }
 }
 
-/// u_lobe chooses the lobe; its remainder, rescaled to [0, 1), serves as another sample value.
+/// `u_lobe` selects the lobe. Its position within the lobe's probability, rescaled to [0, 1),
+/// serves as a further sample value.
 template <typename F>
 inline Vec3<F> Fibre<F>::sample(const View& v, const F& u_lobe, const F& u, const F& u_turn) const {
   F below(0.f), share = v.share[0], sin_o = v.sin_tilted[0], cos_o = v.cos_tilted[0];

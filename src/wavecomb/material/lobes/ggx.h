@@ -26,7 +26,8 @@ struct Ggx {
   /// D(h) of Walter et al., "Microfacet Models for Refraction through Rough Surfaces", EGSR 2007,
   /// eq. 33. The formula uses slopes, which stay accurate for h.z near 1.
   F d(const Vec3<F>& h) const { return d_along(h, F(1.f)); }
-  /// D(h) for h along the vector `sum` of squared length `length2`:
+  /// D(h) for the normal h = `sum` / |`sum`|, where `length2` is the squared length of `sum` (s in
+  /// the formula):
   ///   (alpha |s|^2 / (alpha^2 s_z^2 + s_x^2 + s_y^2))^2 / pi
   F d_along(const Vec3<F>& sum, const F& length2) const {
     const F r = fma(sum.x, sum.x, F(sum.y * sum.y));
@@ -71,7 +72,8 @@ struct Ggx {
   Vec3<F> sample_visible(const Vec3<F>& wo, const F& u, const F& v) const {
     const Vec3<F> k = normalize(Vec3<F>(alpha * wo.x, alpha * wo.y, wo.z));
     const auto [sin_phi, cos_phi] = sincos_2pi(u);
-    // z = (1 - v)(1 + k.z) - k.z on the cap, with 1 - z and z + k.z computed without cancellation.
+    // The sampled z on the spherical cap is (1 - v)(1 + k.z) - k.z. The terms 1 - z and z + k.z are
+    // computed without cancellation.
     const F cap = 1.f + k.z;
     const F n_z = F(1.f - v) * cap;
     const F z = n_z - k.z;

@@ -6,8 +6,8 @@
 
 namespace wavecomb {
 
-/// Ggx with roughness alpha_x along x and alpha_y along y; if they are equal, the values are those
-/// of Ggx.
+/// GGX distribution with roughness alpha_x along x and alpha_y along y. If alpha_x equals alpha_y,
+/// the results equal those of Ggx.
 template <typename F>
 struct AnisotropicGgx {
   F ax, ay;
@@ -32,8 +32,9 @@ struct AnisotropicGgx {
     const F zo = abs(wo.z), zi = abs(wi.z), so = s(wo);
     return F(zi * F(zo + so)) / max(fma(zo, s(wi), F(zi * so)), F(1e-20f));
   }
-  /// Alpha of an isotropic surface whose visible normals have about the same cosines to the viewer
-  /// w: the root mean square of both alphas at z = 1, and the alpha along w's azimuth at z = 0.
+  /// Alpha of an isotropic surface whose visible normals have about the same cosines to the viewing
+  /// direction `w`. For w.z = 1, this is the root mean square of alpha_x and alpha_y. For w.z = 0,
+  /// this is the alpha along the azimuth of `w`.
   F projected_alpha(const Vec3<F>& w) const {
     const F z2 = w.z * w.z;
     const F r2 = max(fma(w.x, w.x, F(w.y * w.y)), F(1e-20f));

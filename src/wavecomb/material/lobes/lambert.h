@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Lambertian diffuse reflection, and the mirroring by which two-sided programs treat back faces.
+/// Lambertian diffuse reflection, and mirroring of directions for the back faces of two-sided
+/// programs.
 #pragma once
 
 #include "wavecomb/core/warp.h"

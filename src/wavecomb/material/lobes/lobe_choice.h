@@ -6,13 +6,13 @@
 
 namespace wavecomb {
 
-/// Selects among lobes whose probabilities are given one after another.
+/// Selects a lobe of a BSDF. The caller passes the probability of each lobe to next() in turn.
 template <typename F>
 struct LobeChoice {
-  const F& u;          ///< sample value in [0, 1)
-  F from{0.f};         ///< sum of the probabilities so far
-  F left{0.f};         ///< remainder of `u` in the selected lobe, rescaled to [0, 1)
-  Mask<F> open{true};  ///< lanes without a lobe so far
+  const F& u;   ///< sample value in [0, 1)
+  F from{0.f};  ///< sum of the probabilities passed to next()
+  F left{0.f};  ///< position of `u` within the selected lobe's probability, rescaled to [0, 1)
+  Mask<F> open{true};  ///< lanes that have not selected a lobe yet
 
   /// Returns the lanes that select the next lobe, which has probability `p`.
   WAVECOMB_INLINE Mask<F> next(const F& p) {

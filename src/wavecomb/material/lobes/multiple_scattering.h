@@ -16,13 +16,13 @@ namespace wavecomb {
 /// L is a polynomial in x = z / (z + alpha / 2) and alpha, fitted to integrals of G2 / G1 over
 /// visible normals. The fit stays below the true loss: the albedo of a white metal, multiple
 /// scattering included, is 0.98 to 1.001 for alpha >= 0.1. L_avg has a lower limit, so that grazing
-/// samples do not get large weights; for alpha < 0.1 this loses up to 10 % of the energy at grazing
-/// angles and never adds any.
+/// samples do not get large weights. For alpha < 0.1, this limit loses up to 10 % of the energy at
+/// grazing angles, but never adds energy.
 template <typename F>
 struct LostEnergy {
   F half_alpha, c1, c2, c3, c4;
   F mean;     ///< L_avg
-  F average;  ///< L_avg with its lower limit
+  F average;  ///< L_avg, clamped to its lower limit
 
   LostEnergy() = default;
   explicit LostEnergy(const F& alpha) : half_alpha(0.5f * alpha) {
@@ -44,8 +44,8 @@ struct LostEnergy {
     return clamp(p, F(0.f), F(1.f));
   }
 
-  /// F_ms for a mean reflectance f: geometric series of further bounces, each of which leaves the
-  /// surface with probability 1 - L_avg.
+  /// F_ms for a mean reflectance f: the sum of a geometric series over further bounces. After each
+  /// bounce, light leaves the surface with probability 1 - L_avg.
   F tint(const F& f) const { return F(F(f * f) * F(1.f - average)) / F(1.f - F(f * average)); }
   Color<F> tint(const Color<F>& f) const { return {tint(f.x), tint(f.y), tint(f.z)}; }
 };

@@ -20,8 +20,8 @@ inline F importance(const Color<F>& c) {
   return 0.5f * F(luminance(c) + max_component(c));
 }
 
-/// G2 / G1 for the reflected and the refracted direction of a microfacet; 1 where the ratios are
-/// not needed.
+/// G2 / G1 for the directions that a microfacet reflects (`up`) and refracts (`down`). Both ratios
+/// are 1 by default.
 template <typename F>
 struct FacetMasking {
   F up = F(1.f), down = F(1.f);
@@ -60,7 +60,7 @@ template <typename F, uint32_t kParts = kAllParts>
 struct OpenPbrBase {
   static constexpr bool kGlass = (kParts & kTransmissionPart) != 0,
                         kFilm = (kParts & kFilmPart) != 0, kBrush = (kParts & kAnisotropyPart) != 0;
-  F metal, opaque, glass;  ///< weights of metal, glossy-diffuse and glass, whose sum is 1
+  F metal, opaque, glass;  ///< weights of metal, glossy-diffuse base and glass, whose sum is 1
   F roughness;
   AnisotropicGgx<F> ggx;
   Mask<F> smooth, thin, present;
@@ -118,7 +118,7 @@ struct OpenPbrBase {
   struct View {
     Mask<F> inside;
     Mask<F> brushed;   ///< anisotropic: alpha_x != alpha_y
-    Mask<F> by_facet;  ///< transmission is compensated per microfacet
+    Mask<F> by_facet;  ///< lanes that compensate transmission separately for each microfacet
     F eta;             ///< relative index across the surface
     F s, g1;           ///< masking of wo: AnisotropicGgx::s, and G1 / (4 z_o)
     F glass_scale;     ///< multiple-scattering compensation
@@ -128,8 +128,8 @@ struct OpenPbrBase {
     Color<F> albedo;  ///< estimate of reflection plus transmission
   };
 
-  /// Computes the view. `o` is wo mirrored above the surface; `below` marks lanes whose viewer is
-  /// on the inner side.
+  /// Computes the view. `o` is the viewing direction wo, mirrored to z >= 0. `below` marks lanes
+  /// whose viewer is on the inner side of the surface.
   View view(const Vec3<F>& o, const Mask<F>& below, const float* energy) const {
     View v;
     const F z = o.z;
@@ -273,7 +273,7 @@ struct OpenPbrBase {
     return {color * F(base * g2), F(base * v.g1) * select(up, share, F(1.f - share))};
   }
 
-  /// eval for variants without transmission.
+  /// Version of eval() for program variants without transmission.
   BsdfEval<F> eval_reflection(const View& v, const Vec3<F>& wo, const Vec3<F>& wi) const {
     const Vec3<F> sum = wi + wo;
     const F len2 = length_squared(sum);
@@ -322,7 +322,7 @@ struct OpenPbrBase {
   }
 
  private:
-  /// Returns the index whose F0 is specular_weight times that of `eta`.
+  /// Returns the index of refraction whose F0 is `specular_weight` times the F0 of index `eta`.
   F scaled_ior(const F& eta) const {
     const F root = F(eta - 1.f) / F(eta + 1.f);
     const F e = copysign(sqrt(min(F(specular_weight * root * root), F(0.66f))), root);

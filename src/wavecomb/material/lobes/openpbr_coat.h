@@ -14,8 +14,8 @@ namespace wavecomb {
 template <typename F>
 struct OpenPbrCoat {
   F weight, roughness, ior, f0, darkening;
-  Color<F> color, half_log;  ///< half_log: half the logarithm of the colour, as light crosses the
-                             ///< coat twice
+  /// `half_log` is half the logarithm of `color`, since light crosses the coat twice.
+  Color<F> color, half_log;
   Ggx<F> ggx;
   Mask<F> smooth;
 
@@ -34,7 +34,7 @@ struct OpenPbrCoat {
     half_log = {half(color.x), half(color.y), half(color.z)};
   }
 
-  /// Values of a coat of weight 1 that depend on wo only.
+  /// Values of a coat of weight 1 that depend on the viewing direction only.
   struct Layer {
     F compensation;  ///< factor on the coat's reflection that compensates for multiple scattering
     F albedo;        ///< directional albedo, at most 1
@@ -56,7 +56,8 @@ struct OpenPbrCoat {
     return {exp(F(half_log.x * inv)), exp(F(half_log.y * inv)), exp(F(half_log.z * inv))};
   }
 
-  /// Fresnel reflectance of a microfacet of the coat, for coat weight `on`.
+  /// Fresnel reflectance of a microfacet of the coat, multiplied by the coat weight `on` and by the
+  /// multiple-scattering factor `compensation`.
   F reflectance(const F& on, const F& compensation, const F& cos_h) const {
     return on * min(F(fresnel_dielectric(cos_h, ior).reflectance * compensation), F(1.f));
   }

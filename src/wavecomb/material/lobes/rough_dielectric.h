@@ -26,8 +26,9 @@ struct RoughDielectric {
   bool schlick;          ///< whether reflectance uses Schlick's approximation
 };
 
-/// Evaluates f |cos theta_i| and the density of the sampler below. With eta the index relative to
-/// the side of wo, and c = wi . h + (wo . h) / eta:
+/// Evaluates f |cos theta_i| and the density of sample_rough_dielectric(). R and T are the Fresnel
+/// reflectance and transmittance, eta is the relative index for a ray from the side of wo, and c =
+/// wi . h + (wo . h) / eta:
 ///   reflection:   f cos = R D G2 / (4 |z_o|),                      pdf = R D G1 / (4 |z_o|);
 ///   transmission: f cos = T D G2 |wi.h wo.h| / (|z_o| c^2 eta^2),
 ///                 pdf = T D G1 |wi.h wo.h| / (|z_o| c^2),
@@ -39,7 +40,7 @@ inline BsdfEval<F> eval_rough_dielectric(const RoughDielectric<F>& lobe, const V
   const F eta = relative_ior(wo, ior);
   const F side = copysign(F(1.f), wo.z);
   const Mask<F> reflects = F(wi.z * side) > 0.f;
-  // h: microfacet normal on the side of wo.
+  // `h` is the microfacet normal on the side of wo.
   const Vec3<F> sum = fma(wi, select(reflects, F(1.f), eta), wo);
   const F len2 = length_squared(sum);
   const Mask<F> nonzero = (len2 > 1e-20f) & (wi.z != 0.f) & (wo.z != 0.f);

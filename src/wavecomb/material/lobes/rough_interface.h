@@ -39,7 +39,8 @@ struct RoughInterface {
         coefficients_[i] = select(has_schlick, mixed, coefficients_[i]);
       }
     }
-    // Ratio of 2 int W c dc to its value for a smooth interface, 1 / (1 + polynomial)^2.
+    // The ratio of 2 int W c dc to its value for a smooth interface is fitted by 1 / (1 +
+    // polynomial)^2.
     F growth(0.f);
     for (size_t j = 5; j-- > 0;) {
       const F exact = polynomial(x, kMean[j]);
@@ -60,7 +61,7 @@ struct RoughInterface {
     return fresnel_.weight(clamp(fma(alpha_, p, z), F(0.f), F(1.f)));
   }
 
-  /// E for cosine z plus `back` L, the contribution of a lobe of multiple scattering. `lost` is
+  /// Albedo E(z), plus the contribution `back` * L(z) of a multiple-scattering lobe. `lost` is
   /// L(z), or 0 for a smooth interface.
   template <typename C>
   C albedo(const C& f0, const C& back, const F& z, const F& lost) const {

@@ -61,7 +61,8 @@ struct ThinFilm {
     const auto channel = [&](const F& r12, const F& r23, const F& s1, const F& s2, const F& s3) {
       const F top = r12 * r12, bottom = r23 * r23, through = 1.f - top;
       const F rs = through * through * bottom / max(F(1.f - top * bottom), F(1e-6f));
-      const F turn = -r12 * r23;  // r21 r23, where the sign is a phase of pi
+      // product r21 r23 of the amplitudes; a negative sign is a phase shift of pi
+      const F turn = -r12 * r23;
       F term = (rs - through) * turn;
       F r = top + rs + 2.f * term * s1;
       term = term * turn;
@@ -79,7 +80,7 @@ struct ThinFilm {
     return select<F>(total, Color<F>(F(1.f)), sum);
   }
 
-  /// Reflectance over a dielectric of index `base`.
+  /// Reflectance of the film on a dielectric of index `base`, at cosine `c`.
   Color<F> over_dielectric(const F& c, const F& base) const {
     const F eta = index(), t = refracted_cos(c, eta), relative = base / eta;
     const F below = refracted_cos(t, relative);
@@ -89,7 +90,7 @@ struct ThinFilm {
     return airy(c, Color<F>(select(total, F(1.f), s)), Color<F>(select(total, F(1.f), p)));
   }
 
-  /// Reflectance over a metal that reflects `f` at this angle.
+  /// Reflectance of the film on a metal whose reflectance without film is `f`, at cosine `c`.
   Color<F> over_metal(const F& c, const Color<F>& f) const {
     const Color<F> root(safe_sqrt(f.x), safe_sqrt(f.y), safe_sqrt(f.z));
     return airy(c, -root, root);

@@ -101,7 +101,7 @@ class MetalBsdf : public BsdfTraits {
     return select<F>(exact_, F82Tint<F>(f0, tint).average(), tinted_.average());
   }
 
-  /// Probability of sampling multiple scattering; exactly 0 where that lobe is black.
+  /// Probability of sampling the multiple-scattering lobe; exactly 0 if the lobe is black.
   F multiple_probability(const F& lost) const {
     return select(smooth_, F(0.f), F(lost * luminance(multiple_)));
   }

@@ -15,16 +15,16 @@
 
 namespace wavecomb {
 
-/// OpenPBR BSDF: fuzz over coat over { metal, glossy diffuse, transmission }. A layer with
+/// OpenPBR BSDF: fuzz on a coat on a base of metal, glossy diffuse and transmission. A layer with
 /// directional albedo E towards the viewer scales the layers below by 1 - E (the specification's
 /// albedo scaling), so energy is conserved, but the BSDF is not reciprocal. Lobes are sampled in
 /// proportion to their estimated contribution; eval and pdf return values of the mixture.
 ///
 /// Opaque and thin-walled surfaces are two-sided. Inside a transmissive solid there is no fuzz, and
 /// the coat does not reflect. Subsurface scattering is diffuse reflection, or, with random walks,
-/// enters through a diffuse lobe to the other side (medium/subsurface/random_walk.h). A variant for
-/// some of the features (material/description/variants.h) gives bitwise equal results for materials
-/// that use no others.
+/// enters through a diffuse lobe to the other side (medium/subsurface/random_walk.h). A program
+/// variant (material/description/variants.h) supports only some features. For materials without
+/// other features, its results are bitwise equal to those of the complete program.
 template <typename F, uint32_t kParts>
 class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   using Viewed = ViewedBsdf<OpenPbrBsdf<F, kParts>, F>;
@@ -38,12 +38,12 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   static constexpr bool kReadsIor = true;
   static constexpr bool kEmits = (kParts & kEmissionPart) != 0;
   static constexpr bool kAbsorbs = (kParts & kTransmissionPart) != 0;
-  // True for all variants, because light selection in the light tree depends on kTransmits.
+  // Equal for all variants, because light selection in the light tree depends on `kTransmits`.
   static constexpr bool kTransmits = true;
   static constexpr bool kHasSubsurface = kBack;
   static constexpr bool kTextured = (kParts & (kTexturePart | kAnisotropyPart)) != 0;
   using Params = OpenPbrParams<F>;
-  /// All inputs or none, because one textured input aligns the tangent frame with the texture.
+  /// All inputs or none, because a single textured input aligns the frame with the texture.
   static constexpr uint32_t kInputs =
       !kTextured ? 0u
                  : input_bit(Input::kBaseColor) | input_bit(Input::kSpecularColor) |
@@ -125,7 +125,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
     typename Base::View base;
     typename EonDiffuse<F>::Sampler eon;
     FuzzLobe<F> fuzz;
-    Color<F> glossy;      ///< transmission of the interface to the diffuse lobe
+    Color<F> glossy;      ///< transmission through the glossy interface to the diffuse base
     F fuzz_on, coat_on;   ///< weights of fuzz and coat on the viewer's side
     F under_fuzz;         ///< transmission through the fuzz
     F coat_compensation;  ///< scale of coat reflection for multiple scattering
@@ -280,8 +280,8 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   }
 
   Vec3<F> to_view(const View& v, const Vec3<F>& w) const { return turned(mirror_z(w, v.side)); }
-  /// Rotates a direction into the frame of anisotropy; turned_back() inverts this. A rotation by 0
-  /// leaves directions bitwise unchanged, including the sign of zeros.
+  /// Rotates a direction into the frame of anisotropy; turned_back() inverts this. A rotation by an
+  /// angle of 0 leaves directions bitwise unchanged, including the sign of zero components.
   Vec3<F> turned(const Vec3<F>& w) const {
     if constexpr (!kTurned) return w;
     const Vec3<F> t(fma(turn_cos_, w.x, F(turn_sin_ * w.y)),

@@ -25,14 +25,15 @@ namespace wavecomb {
 /// of the two directions, which is reciprocal and adds no energy. docs/decisions/preview-surface.md
 /// compares this program with the specification and with other renderers.
 ///
-/// A variant compiled for some of the features (material/description/variants.h) gives bitwise
-/// equal results for materials that use no others.
+/// A program variant (material/description/variants.h) supports only some features. For materials
+/// without other features, its results are bitwise equal to those of the complete program.
 template <typename F, uint32_t kParts>
 class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
   using Viewed = ViewedBsdf<PrincipledBsdf<F, kParts>, F>;
   static constexpr bool kMetal = (kParts & kMetalPart) != 0, kCoat = (kParts & kCoatPart) != 0,
                         kStraight = (kParts & kTransmissionPart) != 0;
-  /// Specular reflectance: scalar in variants without metal, where it has no colour.
+  /// Type of the specular reflectance: a colour, or a scalar in variants without metal, whose
+  /// reflections are not coloured.
   using Tint = std::conditional_t<kMetal, Color<F>, F>;
 
  public:
@@ -40,8 +41,8 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
   static constexpr bool kReadsIor = true;
   static constexpr bool kEmits = (kParts & kEmissionPart) != 0;
   static constexpr bool kTextured = (kParts & kTexturePart) != 0;
-  /// Inputs that may read textures: all or none of them, because one textured input suffices to
-  /// align the tangent frame with the texture.
+  /// Inputs that may read textures. The mask has all inputs or none, because a single textured
+  /// input aligns the tangent frame with the texture.
   static constexpr uint32_t kInputs =
       !kTextured ? 0u
                  : input_bit(Input::kBaseColor) | input_bit(Input::kSpecularColor) |
@@ -108,8 +109,9 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
     F side;
     Vec3<F> o;
     F coat, lost;
-    F lost_share;      ///< factor of the multiple-scattering lobe: energy lost towards the viewer /
-                       ///< mean loss
+    /// Factor of the multiple-scattering lobe: the energy L(wo) that single scattering loses,
+    /// divided by the mean loss L_avg.
+    F lost_share;
     Tint specular;     ///< directional albedo
     Color<F> diffuse;  ///< diffuse colour times transmission towards the viewer
     Color<F> straight;

@@ -20,10 +20,10 @@ namespace {
 
 using Point = Vec3<float>;
 
-/// Bounds of glass are shrunk by this fraction of their size, so that a table does not count as
-/// inside the glass that stands on it.
+/// Fraction of their size by which the bounds of glass are shrunk, so that a table that touches a
+/// drinking glass does not count as inside the glass.
 constexpr float kMargin = 1e-3f;
-/// Number of tests of bounds and triangles after which the search gives up; reached after about
+/// Maximum number of tests of bounds and triangles before the search gives up, which is after about
 /// half a second.
 constexpr size_t kMaxTests = size_t{1} << 28;
 
@@ -50,8 +50,8 @@ bool is_hollow(const Mesh& mesh) {
   return volume < 0;
 }
 
-/// Intersection of a triangle with a box: a convex polygon, clipped after Sutherland and Hodgman
-/// (1974).
+/// Convex polygon that is the intersection of a triangle with a box, clipped by the algorithm of
+/// Sutherland and Hodgman (1974).
 class Clipped {
  public:
   Clipped(const std::array<Point, 3>& triangle, const Bounds& bounds) {
@@ -124,8 +124,8 @@ class GlassTree {
     nodes_.reserve(2 * all_.size() / kLeaf + 2);
     if (!all_.empty()) build(0, all_.size());
   }
-  /// Calls `visit` for each glass solid whose bounds overlap `bounds` until it returns true, and
-  /// returns whether it did. Adds the number of tests to `tests`.
+  /// Calls `visit` for each glass solid whose bounds overlap `bounds`, until a call of `visit`
+  /// returns true. Returns whether a call returned true. Adds the number of tests to `tests`.
   template <typename Visit>
   bool any(const Bounds& bounds, size_t& tests, const Visit& visit) const {
     return !all_.empty() && visit_node(0, bounds, tests, visit);
@@ -215,8 +215,8 @@ class Search {
     std::optional<TriangleColumns> columns;
   };
 
-  /// Calls `visit` for all meshes of all instances until it returns true, and returns whether it
-  /// did.
+  /// Calls `visit` for all meshes of all instances, until a call of `visit` returns true. Returns
+  /// whether a call returned true.
   template <typename Visit>
   bool for_each_instance(const Visit& visit) {
     for (const uint32_t mesh : groups_[0].meshes)
@@ -252,8 +252,9 @@ class Search {
     if (!hollow) hollow = is_hollow(meshes_[mesh]);
     return *hollow;
   }
-  /// Returns whether a point is inside glass: on a line from the point to infinity, more faces of
-  /// glass are left than entered. Faces of the mesh instance that contains the point are ignored.
+  /// Returns whether a point is inside glass. The test follows a line from the point to infinity
+  /// and compares how often the line leaves and enters glass. Faces of the mesh instance that
+  /// contains the point are ignored.
   bool is_in_glass(const Point& p, uint32_t mesh, const Instance* instance) {
     int left = 0;
     glass_->any(grown({p, p}), tests_, [&](const Glass& g) {
@@ -268,7 +269,7 @@ class Search {
     });
     return left > 0;
   }
-  /// Returns whether part of a mesh instance is inside other glass.
+  /// Returns whether a part of a mesh instance is inside the glass of another mesh instance.
   bool is_inside(uint32_t mesh, const Instance& instance) {
     const auto is_other = [&](const Glass& g) { return g.mesh != mesh || g.instance != &instance; };
     const Bounds bounds = grown(instance_bounds(mesh, instance));

@@ -21,9 +21,10 @@ struct PlacedObjects {
   std::span<const MatrixStep> steps;
 };
 
-/// Flag of each material: whether closed meshes with the material are searched for contents.
+/// Predicate on materials. The result tells whether closed meshes with the material are searched
+/// for contents.
 using Glasses = std::vector<bool>;
-/// Returns the result of `test` for each material.
+/// Calls `test` for each material and returns the results as flags.
 Glasses glasses_of(std::span<const Material> materials,
                    const std::function<bool(const Material&)>& test);
 

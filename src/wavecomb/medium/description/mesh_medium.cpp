@@ -25,9 +25,9 @@ bool is_solid(const Material& m) {
   return has_trait(m.program, program_trait::kNests) && !m.openpbr.thin_walled;
 }
 
-/// Returns the coefficients of one channel after OpenPBR 1.1, "Translucent base": extinction is
-/// -ln(colour) / depth, scattering is scatter / depth, and absorption is the difference, which may
-/// still be negative.
+/// Returns the coefficients of one colour channel as defined in OpenPBR 1.1, "Translucent base".
+/// Extinction is -ln(colour) / depth, and scattering is scatter / depth. Absorption is their
+/// difference, which may be negative in this result.
 Coefficients raw_coefficients(float color, float scatter, float depth) {
   const float extinction = -std::log(std::clamp(color, kDarkestTransmission, 1.f)) / depth;
   const float scattering = std::max(scatter, 0.f) / depth;
@@ -40,7 +40,8 @@ void set_medium(const OpenPbr& o, MeshMedium<float>& out) {
   Coefficients k[3] = {raw_coefficients(c.x, s.x, o.transmission_depth),
                        raw_coefficients(c.y, s.y, o.transmission_depth),
                        raw_coefficients(c.z, s.z, o.transmission_depth)};
-  // A negative absorption is raised to 0 by adding the same amount to all channels.
+  // If a channel has negative absorption, add the same amount to all channels, so that the least
+  // absorption is 0.
   const float least = std::min({k[0].absorption, k[1].absorption, k[2].absorption, 0.f});
   out.absorption = {k[0].absorption - least, k[1].absorption - least, k[2].absorption - least};
   out.scattering = {k[0].scattering, k[1].scattering, k[2].scattering};
@@ -64,7 +65,7 @@ bool is_clear(const Material& m) {
          !m.needs_presence();
 }
 
-/// Returns whether a material is a solid that may transmit light somewhere.
+/// Returns whether a material is a solid that may transmit light at some of its hits.
 bool may_transmit(const Material& m, const GraphSet& graphs) {
   return is_solid(m) && (m.openpbr.transmission_weight > 0 ||
                          graphs.drives(m.graph, graph_parameter("transmission_weight")));

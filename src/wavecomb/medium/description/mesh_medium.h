@@ -27,8 +27,8 @@ struct MeshMedium {
   Color<F> absorption, scattering;  ///< coefficients, per unit of length
   F anisotropy;                     ///< mean cosine of the scattering angle
   F ior;
-  /// Where media overlap, the medium of highest priority applies; among equal priorities, the last
-  /// one entered.
+  /// Priority where media overlap: rays travel in the medium of the highest priority. Among equal
+  /// priorities, rays travel in the medium that they entered last.
   F priority;
   UInt<F> kind;  ///< BoundaryKind
   Vec3<F> pad, pad_too;
@@ -38,8 +38,8 @@ static_assert(sizeof(MeshMedium<float>) == 64);
 
 /// Device view of the media of all materials.
 struct MeshMediaView {
-  /// Media by material. Null if no material needs a medium stack; absorption is then applied at the
-  /// hit where a path leaves the solid (path/steps/interact.h).
+  /// Array of media, indexed by material. If no material needs a medium stack, the pointer is null,
+  /// and absorption is applied at the hit where a path leaves the solid (path/steps/interact.h).
   const MeshMedium<float>* media = nullptr;
   uint32_t event_material = 0;  ///< material that shades collisions in media with clear boundaries
 
@@ -48,24 +48,24 @@ struct MeshMediaView {
   }
 };
 
-/// Returns whether a material is a solid that transmits light, possibly by a value graph, and
-/// absorbs part of it inside with constant coefficients.
+/// Returns whether a material is a transmissive solid with absorption by constant coefficients. A
+/// value graph may drive the transmission.
 bool is_absorbing_solid(const Material& material, const GraphSet& graphs);
-/// Returns whether a material is a solid that transmits light and whose absorption comes from a
-/// value graph. The graph is evaluated where a path leaves the glass, so the coefficients of a
-/// segment depend on its direction.
+/// Returns whether a material is a transmissive solid whose absorption is driven by a value graph.
+/// The graph is evaluated at the point where a path leaves the glass, so the absorption along a ray
+/// segment depends on the direction of travel.
 bool absorbs_by_graph(const Material& material, const GraphSet& graphs);
 /// Returns whether a material needs paths to track a medium stack: it scatters inside, has a
-/// priority, or bounds an absorbing medium without refraction. If `absorbing` is set, absorption
-/// alone is enough. Set `absorbing` for scenes with volumes, in which a path scattered by a volume
-/// inside the solid has covered part of its length before the collision, and for scenes with
-/// objects inside absorbing glass (medium/description/glass_contents.h).
+/// priority, or bounds an absorbing medium without refraction. If `absorbing` is set, any absorbing
+/// medium needs a medium stack. Set `absorbing` for scenes in which ray segments inside a solid
+/// need not end at its surface: scenes with volumes, and scenes with objects inside absorbing glass
+/// (medium/description/glass_contents.h).
 bool needs_medium_stack(const Material& material, const GraphSet& graphs, bool absorbing);
-/// Appends the material that shades collisions inside meshes, if a material needs a medium stack.
-/// Returns the index of the appended material, or kInheritMaterial.
+/// Appends the material that shades collisions inside meshes, and returns its index. If no material
+/// needs a medium stack, appends nothing and returns kInheritMaterial.
 uint32_t add_inside_material(std::vector<Material>& materials, const GraphSet& graphs,
                              bool absorbing);
-/// Makes the media of all materials; empty if no material needs a medium stack.
+/// Makes the media of all materials. The result is empty if no material needs a medium stack.
 std::vector<MeshMedium<float>> make_mesh_media(std::span<const Material> materials,
                                                const GraphSet& graphs, bool absorbing);
 

@@ -15,11 +15,11 @@ namespace {
 
 /// Lower limit of mean free paths, which bounds the number of collisions inside an object.
 constexpr float kMinFreePath = 1e-6f;
-/// Lower limit of the colours by which random walks select a channel.
+/// Lower limit of the colour channels. Random walks select a channel in proportion to its colour.
 constexpr float kMinColor = 0.05f;
-/// Correction of van de Hulst's s, divided by s (1 - s), as a polynomial in s and in the mean
-/// cosine. Fitted to colours computed by adding and doubling (tests/python/test_walks.py), to 0.4 %
-/// of the colour.
+/// Correction of the parameter s in van de Hulst's approximation, divided by s (1 - s). The
+/// correction is a polynomial in s and in the mean cosine, fitted to colours computed by adding and
+/// doubling (tests/python/test_walks.py). The error of the fit is at most 0.4 % of the colour.
 constexpr float kOffSimilarity[4][5] = {{0.0153f, -0.0261f, -0.1611f, 0.0637f, 0.1811f},
                                         {-0.0526f, 0.3743f, 0.5764f, -0.9722f, -0.4419f},
                                         {0.0812f, -0.9642f, -0.2726f, 1.9433f, 0.3053f},

@@ -12,12 +12,12 @@ namespace wavecomb {
 struct Material;
 struct GraphSet;
 
-/// How light enters a surface with a subsurface random walk; the value of
-/// OpenPbrRecord::subsurface.
+/// Kind of subsurface random walk of a material, stored in OpenPbrRecord::subsurface.
 enum class SubsurfaceKind : uint8_t {
   kNone,   ///< no random walk
-  kWhole,  ///< all light enters, and absorption in the medium determines the colour
-  /// A graph drives the colour, which tints the light that enters; the medium does not absorb.
+  kWhole,  ///< light enters untinted, and absorption in the medium determines the colour
+  /// The medium does not absorb. The subsurface colour, driven by a value graph, tints light that
+  /// enters.
   kTinted,
 };
 
@@ -36,7 +36,7 @@ static_assert(sizeof(SubsurfaceMedium<float>) == 64);
 
 /// Returns the kind of random walk of a material.
 SubsurfaceKind subsurface_kind(const Material& material, const GraphSet& graphs);
-/// Makes the medium of a material whose kind is not kNone.
+/// Makes the medium of a material whose SubsurfaceKind is not kNone.
 SubsurfaceMedium<float> make_subsurface_medium(const Material& material, SubsurfaceKind kind);
 
 /// Returns the single-scattering albedo, for mean cosine `anisotropy`, for which a half-space under
@@ -57,7 +57,7 @@ double diffusion_length(double albedo, double anisotropy);
 /// Device view of all media for subsurface random walks.
 struct SubsurfaceView {
   const SubsurfaceMedium<float>* media =
-      nullptr;                 ///< indexed by material; null if there are no random walks
+      nullptr;  ///< media, indexed by material; null if no material has subsurface random walks
   uint32_t exit_material = 0;  ///< white diffuse material that shades exit points of random walks
 };
 

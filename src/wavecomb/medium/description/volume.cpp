@@ -35,7 +35,7 @@ TransformedGrid transform_grid(const Volume& v, const VolumeField& field) {
   return transformed;
 }
 
-/// Packs the bounding cells of a moving field.
+/// Packs the bounding cells of a moving field, with the transform from world space to these cells.
 TransformedGrid transform_cells(const Volume& v, const VolumeField& field,
                                 const MovedCells& cells) {
   TransformedGrid transformed;
@@ -45,7 +45,8 @@ TransformedGrid transform_cells(const Volume& v, const VolumeField& field,
   return transformed;
 }
 
-/// Returns the maps for looking up a field from a space that `to_bricks` maps to its bricks.
+/// Returns the transforms for looking up a moving field at points of a space. `to_bricks` maps the
+/// space to bricks of the field.
 FieldDrift drift_of(const Volume& v, const VolumeField& field, const WideMap& to_bricks) {
   const WideMap object = bricks_to_object(field);
   FieldDrift drift{};

@@ -13,26 +13,28 @@
 
 namespace wavecomb {
 
-/// Edge length of a brick in voxels. A brick stores one more layer of voxels at its upper faces, so
-/// that a trilinear lookup reads a single brick.
+/// Edge length of a brick in voxels. A brick also stores copies of the next voxels beyond its upper
+/// faces, so that a trilinear lookup reads a single brick.
 inline constexpr uint32_t kBrickEdge = 8, kBrickRow = kBrickEdge + 1,
                           kBrickVoxels = kBrickRow * kBrickRow * kBrickRow;
-/// Table entry of a cell without a brick.
+/// Value in the table of a grid for a cell that has no brick.
 inline constexpr uint32_t kNoBrick = 0xffffffffu;
 
-/// Device view of a grid. Coordinates are measured in bricks; the table covers [0, size).
+/// Device view of a grid. The unit of the grid's space is one brick, and the table of bricks covers
+/// [0, size).
 struct GridView {
   const uint32_t* table = nullptr;  ///< brick number of each cell, x fastest, or kNoBrick
-  /// Maximum over all components that a lookup in each cell can return.
+  /// For each cell, the largest value of any component that a lookup in the cell can return.
   const float* most = nullptr;
-  const void* voxels = nullptr;  ///< bricks of floats, or of halves in pairs
+  /// Voxels of the bricks, as 32-bit floats, or as 16-bit floats packed in pairs.
+  const void* voxels = nullptr;
   uint32_t size[3] = {0, 0, 0};  ///< cells
   uint32_t components = 1;       ///< 1 or 3, interleaved
   bool is_half = false;
   float background = 0;  ///< value outside all bricks
 };
 
-/// Input of a grid: voxels in bricks of 8^3, the layout of volume files.
+/// Voxels from which a VolumeGrid is made, in bricks of 8^3 voxels, as volume files store them.
 struct GridBricks {
   std::string name;                  ///< used in messages
   std::span<const int32_t> origins;  ///< x, y, z of the first voxel of each brick, multiples of 8
@@ -48,9 +50,9 @@ struct GridBricks {
 /// An immutable sparse voxel grid: bricks of voxels, and a table of their positions.
 class VolumeGrid {
  public:
-  /// Makes a grid. Throws Error with one line for values that are not finite or, unless the grid is
-  /// signed, negative; for duplicate bricks or origins that are not multiples of 8; and for grids
-  /// beyond the limit of 32-bit indices.
+  /// Makes a grid. Throws Error if a value is not finite, if a value of an unsigned grid is
+  /// negative, if bricks are duplicate, if an origin is not a multiple of 8, or if the grid needs
+  /// more than 32-bit indices.
   explicit VolumeGrid(const GridBricks& bricks);
 
   GridView view() const;
@@ -81,7 +83,7 @@ class VolumeGrid {
 
 /// A grid, and the map from voxel indices to the volume's local space.
 struct VolumeField {
-  std::shared_ptr<const VolumeGrid> grid;  ///< null if the field is not given
+  std::shared_ptr<const VolumeGrid> grid;  ///< null if the volume does not have the field
   Affine index_to_object;
 };
 
@@ -95,13 +97,14 @@ class VolumeMotion;
 /// p and time t reads the other fields at p - v(p) t.
 struct Volume {
   std::string name;
-  VolumeField density;  ///< field of one component; 1 everywhere if not given
-  VolumeField color;    ///< field of three components; 1 everywhere if not given
-  VolumeField glow;     ///< emission field; if not given, the density
-  /// Three signed components in the volume's local space per second; if not given, the volume does
-  /// not move.
+  VolumeField density;  ///< one component; the density is 1 everywhere if there is no grid
+  VolumeField color;    ///< three components; the colour is 1 everywhere if there is no grid
+  VolumeField glow;     ///< emission field; the density field is used if there is no grid
+  /// Velocity field: three signed components, in units of the volume's local space per second. A
+  /// volume without velocity field does not move.
   VolumeField velocity;
-  std::array<float, 2> seconds{0, 0};          ///< times t of shutter open and close
+  /// Times in seconds of shutter open and shutter close, relative to the time of the grids.
+  std::array<float, 2> seconds{0, 0};
   std::shared_ptr<const VolumeMotion> motion;  ///< set by SceneBuilder::add_volume
   /// Corners of a homogeneous volume in local space, used if there is no density field.
   std::array<Vec3<float>, 2> box{Vec3<float>(0.f), Vec3<float>(0.f)};
@@ -113,26 +116,28 @@ struct Volume {
   bool moves() const { return velocity.grid && (seconds[0] != 0 || seconds[1] != 0); }
 };
 
-/// Packed reference to a grid: x_bricks = A x_world + t, rows of A each followed by its component
-/// of t.
+/// Packed grid with its transform x_bricks = A x_world + t. `to_bricks` holds three rows, each a
+/// row of A followed by a component of t.
 struct TransformedGrid {
   GridView grid;
   float to_bricks[12] = {};
 };
 
-/// Maps for looking up a moving field, from the space of cells or of the world.
+/// Transforms for looking up a moving field at points of a space, either world space or the space
+/// of bounding cells.
 struct FieldDrift {
   float to_velocity[12];  ///< transform to bricks of the velocity grid
   float to_bricks[12];    ///< transform to bricks of the field
   float per_second[12];   ///< transform from velocities to bricks of the field, without translation
 };
 
-/// Packed volume. All lanes of a packet look up the same volume at a time, so records are read
-/// without gathers.
+/// Packed volume. All lanes of a packet process the same volume, so a record is read without
+/// gathers.
 struct VolumeRecord {
-  TransformedGrid density;         ///< without a density table, the density is 1 everywhere
-  TransformedGrid color;           ///< without a table, the colour factor is 1 everywhere
-  TransformedGrid emission_field;  ///< emission field; equals density if there is none
+  TransformedGrid density;  ///< density field; the density is 1 everywhere if the grid has no table
+  TransformedGrid color;    ///< colour field; the colour is 1 everywhere if the grid has no table
+  /// Emission field; a copy of `density` if the volume has no emission field.
+  TransformedGrid emission_field;
   float extinction[3], albedo[3], emission[3];
   float max_extinction;  ///< maximum over the channels
   float anisotropy;
@@ -144,13 +149,13 @@ struct VolumeRecord {
 
   TransformedGrid density_cells, emission_cells;  ///< without a table
   GridView velocity;
-  /// Transforms from the spaces of density_cells and emission_cells.
+  /// Transforms for lookups from the spaces of `density_cells` and `emission_cells`.
   FieldDrift density_drift, emission_drift;
-  FieldDrift color_drift;  ///< transforms from world space
+  FieldDrift color_drift;  ///< transforms for lookups from world space
   float seconds_open, seconds_span;
 };
 
-/// Maximum number of volumes of a scene; kernels visit them one after the other.
+/// Maximum number of volumes of a scene. Kernels process all volumes of a scene in turn.
 inline constexpr size_t kMaxVolumes = 65536;
 
 /// Device view of all volumes.
@@ -161,7 +166,7 @@ struct VolumeView {
   bool emits = false;           ///< some volume emits
 };
 
-/// Throws Error with one line that names the volume if a value is invalid.
+/// Throws Error if a value of the volume is invalid. The message names the volume.
 void check_volume(const Volume& volume);
 VolumeRecord make_volume_record(const Volume& volume);
 /// Returns the world-space corners of the box of cells that a volume fills.

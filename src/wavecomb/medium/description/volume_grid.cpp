@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// VolumeGrid: converts bricks of a file into bricks with a border and a table of brick positions.
+/// Implementation of VolumeGrid, which converts the bricks of a volume file into bricks with a
+/// border and a table of brick positions.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -20,7 +21,7 @@ size_t brick_words(uint32_t components, bool is_half) {
   return is_half ? (values + 1) / 2 : values;
 }
 
-/// Returns the bits of a value as a grid stores it.
+/// Returns the bits of a value as a 16-bit or 32-bit float.
 uint32_t value_bits(float value, bool is_half) {
   return is_half ? uint32_t{float_to_half(value)} : float_bits<float>(value);
 }
@@ -45,7 +46,8 @@ class BrickSource {
       at_[cell] = static_cast<uint32_t>(i);
     }
   }
-  /// The bricks that contain the voxels of a cell and the voxels on the cell's upper faces.
+  /// The eight input bricks around the upper corner of a cell, which contain all voxels of the
+  /// stored brick with its border.
   class Corner {
    public:
     Corner(const BrickSource& source, const std::array<uint32_t, 3>& cell)
@@ -58,8 +60,8 @@ class BrickSource {
                        : kNoBrick;
       }
     }
-    /// Returns the bits of component c of a voxel of the cell, each index below kBrickRow. Apart
-    /// from the sign, the bits have the same order as the values.
+    /// Returns the bits of component `c` of voxel (x, y, z) of the cell, with indices from 0 to
+    /// kBrickRow - 1. The bits of values of the same sign are ordered as their magnitudes.
     uint32_t bits(uint32_t x, uint32_t y, uint32_t z, uint32_t c) const {
       const uint32_t brick = near_[x / kBrickEdge | y / kBrickEdge << 1 | z / kBrickEdge << 2];
       if (brick == kNoBrick) return background_;
@@ -101,7 +103,7 @@ void check_values(const GridBricks& b) {
                 "' has a background that is negative or not finite; fix the file");
 }
 
-/// Throws Error unless the arrays of a grid have sizes that match.
+/// Throws Error unless the array sizes of a grid match its number of bricks and components.
 void check_layout(const GridBricks& b, const std::string& name) {
   const size_t count = b.origins.size() / 3;
   if (b.components != 1 && b.components != 3)
@@ -112,7 +114,7 @@ void check_layout(const GridBricks& b, const std::string& name) {
     throw Error(name + " does not have 8 x 8 x 8 voxels for each brick");
 }
 
-/// Smallest and largest origins of bricks, in voxels.
+/// Smallest and largest brick origins of a grid, in voxels.
 struct BrickExtent {
   std::array<int64_t, 3> lo{}, hi{};
 };

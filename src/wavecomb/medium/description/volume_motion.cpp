@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-/// A lookup at p at time t reads a field at p - v(p) t. The velocities in a cell lie within bounds,
-/// so all lookups from the cell read within a box, and the maximum over this box bounds their
-/// values. Maxima over boxes come from tables of maxima of 2^3, 4^3 ... cells.
+/// Implementation of VolumeMotion. A lookup at point p and time t reads a field at p - v(p) t. The
+/// velocities v in a cell have bounds, so all lookups from the cell read points within a box. The
+/// field's maximum over this box bounds the values of these lookups. Maxima over boxes are read
+/// from tables of maxima over 2^3, 4^3, ... cells.
 #include "wavecomb/medium/description/volume_motion.h"
 
 #include <algorithm>
@@ -14,7 +15,8 @@
 namespace wavecomb {
 namespace {
 
-/// Maximum number of bounding cells of a field; with more, cells are made larger.
+/// Maximum number of bounding cells of a field. If more cells would be needed, the cells are made
+/// larger.
 constexpr double kMaxCells = 1 << 22;
 /// Rounding tolerance of kernels, in bricks. This tolerance keeps the box of a cell without motion
 /// from reaching into neighbouring cells.
@@ -38,7 +40,7 @@ WideBox image_of(const WideMap& map, const WideBox& box) {
   return out;
 }
 
-/// Table of maxima over boxes of cells.
+/// Tables for the maximum of a field over boxes of cells.
 class MaxPyramid {
  public:
   /// `cells` holds the values of the cells, x fastest, and `outside` is the value outside all
@@ -105,7 +107,7 @@ class MaxPyramid {
   float outside_;
 };
 
-/// Bounds of the velocities in boxes of a velocity grid.
+/// Tables for the bounds of velocities over boxes of a velocity grid.
 class VelocityBounds {
  public:
   explicit VelocityBounds(const VolumeGrid& grid) : view_(grid.view()) {
@@ -153,7 +155,7 @@ class VelocityBounds {
   std::vector<MaxPyramid> pyramids_;
 };
 
-/// A field with the velocity field that moves it.
+/// Field of a volume, with the velocity field that moves it.
 class MovedField {
  public:
   MovedField(const Volume& v, const VolumeField& field, const VelocityBounds& velocity)

@@ -11,12 +11,13 @@
 
 namespace wavecomb {
 
-/// Size of the stack. On overflow, the stack drops the first boundary that was entered.
+/// Maximum number of entries in a medium stack. A further entry replaces the boundary that was
+/// entered first.
 inline constexpr size_t kMaxMediumStack = 4;
-/// Material of an empty entry.
+/// Material id of an empty entry of the stack.
 inline constexpr uint32_t kNoMaterial = 0xffffffffu;
 
-/// Bound of a medium.
+/// Boundary of a medium: a mesh and its material.
 template <typename F>
 struct MediumBoundary {
   UInt<F> object;    ///< instance_geometry() of the mesh
@@ -44,8 +45,8 @@ class MediumStack {
     r.material_2 = material_[2], r.material_3 = material_[3];
   }
 
-  /// Updates the stack for the medium boundary that a ray of the last path vertex has crossed;
-  /// `bit` (Crossing) selects the ray.
+  /// Enters or leaves a medium boundary that was hit at the last path vertex, if a ray from that
+  /// vertex crosses the boundary. `bit` selects the ray: the bounce or the shadow ray.
   void cross(const MeshMediaView& view, const UInt<F>& object, const UInt<F>& crossed, Crossing bit,
              const Mask<F>& active) {
     const auto has = [&](Crossing b) { return Mask<F>((crossed & uint32_t{b}) != U(0u)); };
@@ -57,7 +58,7 @@ class MediumStack {
     enter({object, material}, crosses & has(kEnters));
     leave(object, crosses & not_(has(kEnters)));
   }
-  /// Returns a packet with this stack in all lanes.
+  /// Returns a packet of stacks with a copy of this stack in each lane.
   template <typename G>
   MediumStack<G> broadcast() const {
     MediumStack<G> all;
@@ -67,7 +68,7 @@ class MediumStack {
     }
     return all;
   }
-  /// Replaces the stacks of `lanes` by those of `other`.
+  /// Replaces the stacks in `lanes` by the stacks of the same lanes in `other`.
   void assign(const MediumStack& other, const Mask<F>& lanes) {
     for (size_t k = 0; k < kMaxMediumStack; ++k) {
       object_[k] = select(Mask<U>(lanes), other.object_[k], object_[k]);
@@ -140,15 +141,15 @@ class MediumStack {
 /// Medium boundary that a ray hits.
 template <typename F>
 struct BoundaryHit {
-  MediumStack<F> after;  ///< medium stack on the other side
+  MediumStack<F> after;  ///< medium stack on the other side of the boundary
   /// Whether the ray passes unchanged, because a medium of higher priority encloses the boundary or
   /// the boundary has no effect.
   Mask<F> passes;
   F outer;  ///< index of refraction on the outer side
 };
 
-/// Returns the effect of `bound` on `lanes`, which hit it from outside where `enters`. `current` is
-/// the top of `before`.
+/// Returns the effect of the boundary `bound` on the rays in `lanes` that hit it. Rays in the lanes
+/// `enters` hit the boundary from outside. `current` is the top entry of the stack `before`.
 template <typename F>
 inline BoundaryHit<F> cross_boundary(const MeshMediaView& view, const MediumStack<F>& before,
                                      const MediumBoundary<F>& current,

@@ -4,8 +4,8 @@
 /// A ray through media k with absorption a_k and scattering s_k, over lengths t_k, has throughput
 ///   *= exp(-sum a_k t_k) and collides after an exponentially distributed optical depth of
 ///   scattering, which a hero channel samples (medium/volume/tracking.h). Each medium is
-///   homogeneous, so a new distance is sampled where a medium begins. If lights guide distances,
-///   the distance is sampled when the next boundary or surface is known.
+///   homogeneous, so a new distance is sampled where a medium begins. With
+///   equiangular sampling, the distance is sampled after the next boundary or surface was found.
 ///
 /// Scattering behind a refractive boundary skips light sampling, since no shadow ray can reach a
 /// light, and continues as a random walk. Where the random walk hits a surface, the path continues
@@ -40,18 +40,18 @@ class NestedMedia {
         b_(buffers),
         counts_(counts) {}
 
-  /// Returns the medium stack at a point. Callers may pass the `keys` of any path.
+  /// Returns the medium stack at a point. `keys` are the presence keys of any path.
   MediumStack<float> stack_at(Vec3<float> p, float time, PresenceKeys keys) const;
 
   /// Traces all rays to the event or surface that stops them. `hits` holds the rays' first hits,
-  /// and on return the hits of visible surfaces. `around` is the medium stack at the camera for new
-  /// paths, or null for paths that continue. start(i, path) returns the NestedRayStart of the
+  /// and on return the hits at which the rays end. `around` is the medium stack at the camera for
+  /// new paths, or null for paths that continue. start(i, path) returns the NestedRayStart of the
   /// packet at i.
   template <typename F, typename Start>
   void sample_flight(const NestedRays& rays, const HitSpan& hits, const NestedEvents& events,
                      const MediumStack<float>* around, PresenceKeys keys, const Start& start) const;
-  /// Multiplies `product` by the transmittance of shadow rays of length `most`, where 0 skips a
-  /// ray. `keys` include the shadow sets if lights are linked.
+  /// Multiplies `product` by the transmittance of shadow rays of length `most`. A ray of length 0
+  /// is skipped. If the scene has light linking, `keys` include the shadow sets.
   template <typename F>
   void attenuate(const NestedRays& rays, const float* most, float* const (&product)[3],
                  PresenceKeys keys) const;
@@ -101,13 +101,14 @@ class NestedMedia {
     counts_.walk_steps += n;
   }
 
-  /// Returns the lanes of a packet whose rays see an object (instance_geometry): it is visible to
-  /// their kind of ray, and linked to the light of a shadow ray. An object that is invisible to a
-  /// ray neither stops nor attenuates the ray, but the ray still enters and leaves the object's
-  /// medium.
+  /// Returns the lanes of a packet for whose rays an object (instance_geometry()) is visible. The
+  /// object must be visible to this kind of ray. For a shadow ray, the light's shadow linking must
+  /// also include the object. An object that is invisible to a ray neither stops nor attenuates the
+  /// ray, but the ray still enters and leaves the object's medium.
   template <typename F>
   Mask<F> is_visible(const Rays<F>& r, const UInt<F>& object, const Mask<F>& lanes) const;
-  /// Returns the medium inside a boundary, or none if the ray does not see the boundary.
+  /// Returns the medium inside a boundary. The medium is empty in lanes for whose rays the boundary
+  /// is invisible.
   template <typename F>
   MeshMedium<F> medium_of(const Rays<F>& r, const MediumBoundary<F>& bound,
                           const Mask<F>& active) const {
@@ -115,7 +116,7 @@ class NestedMedia {
     return load_row<MeshMedium, F>(reinterpret_cast<const float*>(scene_.nested_media.media),
                                    bound.material, is_visible<F>(r, bound.object, occupied));
   }
-  /// Event in a volume that stops a ray, and the distance to it.
+  /// Volume event that stops a ray: the distance and the material of the event.
   template <typename F>
   struct Limit {
     F length;
@@ -132,25 +133,25 @@ class NestedMedia {
   }
   /// Returns the distance at which a ray continues past a hit at t that neither stops it nor bounds
   /// a medium. The step is just above rounding error, since a medium boundary may follow closely.
-  /// Hitting the same surface again only costs time.
+  /// If the ray then hits the same surface again, only time is lost.
   template <typename F>
   F past_hit(const F& t) const {
     return fma(t, F(1.f + 0x1p-20f), F(scene_.scale * 0x1p-21f));
   }
-  /// Returns what the rays of the packet hit. Where a ray passes through a boundary, updates `s`
-  /// and `stack` to the other side.
+  /// Returns what the rays of the packet hit. In lanes whose ray passes through a boundary, `r.s`
+  /// and `stack` are updated to the other side.
   template <typename F>
   BoundaryHits<F> intersect_boundary(Rays<F>& r, MediumStack<F>& stack,
                                      const MediumBoundary<F>& current, const Mask<F>& lanes) const;
-  /// Returns whether lights guide the distances in a medium.
+  /// Returns the lanes in whose medium distances are sampled by equiangular sampling.
   template <typename F>
   static Mask<F> is_lit(const MeshMedium<F>& m) {
     return Mask<F>(m.kind == UInt<F>(static_cast<uint32_t>(BoundaryKind::kClear))) &
            (max_component(m.scattering) > 0.f);
   }
   /// Samples the distance to the next collision with the random number `u`. In a medium without
-  /// scattering there is no collision, and a random number that is stored for the first distance
-  /// stays stored. If lights guide the distance, `u` is stored until the length of the segment is
+  /// scattering, no distance is sampled, and the random number for the first distance is kept for
+  /// the next medium. With equiangular sampling, `u` is stored until the length of the segment is
   /// known.
   template <typename F>
   void sample_distance(Rays<F>& r, const MediumStack<F>& stack, const F& u,

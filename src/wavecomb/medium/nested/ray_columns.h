@@ -9,7 +9,7 @@
 
 namespace wavecomb {
 
-/// Columns of rays, and the rows of their paths.
+/// Rays of a wave in columns, and the rows of their paths.
 struct NestedRays {
   float *o[3], *d[3];    ///< updated if a path has scattered
   const uint32_t* slot;  ///< row of each path
@@ -19,9 +19,10 @@ struct NestedRays {
   float* stacks;       ///< MediumStackRow
 };
 
-/// Results of the rays, as in Flights, and the transmittance of absorption. If `limited` is set,
-/// `t` and `material` initially hold the volume event that stops each ray. The event of a ray is
-/// dropped once the ray has scattered in a mesh medium; its hero channel becomes kNoHero.
+/// Volume events and collisions that stop the rays, with the weights of Flights, and the
+/// transmittance due to absorption. If `limited` is set, `t` and `material` initially hold the
+/// volume event that stops each ray. The event of a ray is dropped once the ray has scattered in a
+/// mesh medium; its hero channel becomes kNoHero.
 struct NestedEvents {
   bool limited;
   float* t;
@@ -65,9 +66,9 @@ struct NestedRayState {
   Color<F> throughput;
   F start;  ///< length covered since the last collision
   F first;  ///< SubsurfaceWalk::first
-  /// Distance to the next collision, or kFar. Before the first scattering, the value is kFar (1 +
-  /// u), which stores the random number u of the first distance; u is stratified over a pixel's
-  /// samples. For shadow rays, the value is the remaining length.
+  /// Distance to the next collision, or kFar if the distance was not sampled. Before the first
+  /// scattering, kFar (1 + u) stores the random number u of the first distance, which is stratified
+  /// over a pixel's samples. For shadow rays, the value is the remaining length.
   F rest;
   UInt<F> seed, number, hero, flags;
   WAVECOMB_FIELDS(o, d, throughput, start, first, rest, seed, number, hero, flags)
@@ -98,7 +99,8 @@ struct NestedRayPacket {
   uint32_t kind = kVisibleToAll;  ///< RayVisibility of the rays
   UInt<F> shadow_set{0u};         ///< ShadowRow::set of shadow rays; 0 if all objects block them
 };
-/// Hits of a packet: surfaces, and which of them bound a medium or let the ray pass.
+/// Hits of a packet of rays: lanes that hit a surface, lanes whose surface bounds a medium, and
+/// lanes whose ray passes through.
 template <typename F>
 struct BoundaryHits {
   Mask<F> surface, passes, bound;

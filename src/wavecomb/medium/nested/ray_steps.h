@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Steps of rays through media inside meshes, each to the next medium boundary or collision.
-/// Included by nested_media.h.
+/// Definitions for nested_media.h, which includes this file. Each step advances a ray to the next
+/// medium boundary or collision.
 #pragma once
 
 #include "wavecomb/medium/nested/nested_media.h"
@@ -19,7 +19,7 @@ inline Mask<F> NestedMedia::is_visible(const Rays<F>& r, const UInt<F>& object,
   const LinkView& links = scene_.lights.links;
   const Mask<F> linked = visible & Mask<F>(r.shadow_set != U(0u));
   if (!links.members || none(linked)) return visible;
-  // Applies the test of casts_shadow() (accel/presence.h).
+  // Test whether the object casts a shadow, as casts_shadow() in accel/presence.h does.
   const U set = select(Mask<U>(linked), r.shadow_set, U(1u)) - 1u;
   const U link = gather<U>(links.classes, object, Mask<U>(linked));
   const U word = gather<U>(links.members, (link - 1u) * links.words + (set >> 5), Mask<U>(linked));
@@ -161,7 +161,7 @@ inline size_t NestedMedia::advance(const NestedRays& all, const HitSpan& hits,
   const Mask<F> collides = r.active & not_(stopped) & (s.rest < far);
   const F length = select(collides, s.rest, far);
 
-  // Ratios relative to the channel with the least scattering, so that none overflows.
+  // Densities relative to the colour channel with the least scattering, to avoid overflow.
   const Color<F>&a = medium.absorption, &b = medium.scattering;
   const F least = min(b.x, min(b.y, b.z)), most = max(max_component(b), F(1e-30f));
   const auto density = [&](const F& scattering) {
@@ -209,7 +209,7 @@ inline size_t NestedMedia::advance(const NestedRays& all, const HitSpan& hits,
     row.crossed = U(0u);
     row.outer = boundary.outer;
     row.medium = current.material;
-    // Rays that leave the scene while inside a mesh, which is therefore not closed.
+    // These rays have left the scene while inside a mesh, so the mesh is not closed.
     s.start = select(open & not_(collides) & not_(stopped), F(kInfinity), s.start);
     const U by_event = select(Mask<U>(event), U(scene_.nested_media.event_material),
                               U(uint32_t{Flights::kNoEvent}));
@@ -294,7 +294,8 @@ inline size_t NestedMedia::advance_shadow(const NestedRays& all, float* const (&
       r.l.absorbed * Color<F>(exp(F(-e.x * length)), exp(F(-e.y * length)), exp(F(-e.z * length)));
   const Vec3<F> o = r.s.o;
   const BoundaryHits<F> boundary = intersect_boundary<F>(r, stack, current, r.active & not_(open));
-  // A hit that bounds no medium does not block this ray, which was found to be unoccluded.
+  // Hits that bound no medium do not block the shadow ray, because an earlier query found the ray
+  // unoccluded.
   const Mask<F> by = r.active & not_(open) & not_(boundary.bound);
   const F past = past_hit<F>(r.hit.t);
   r.s.o = select<F>(by, fma(r.s.d, past, o), r.s.o);

@@ -23,7 +23,8 @@
 ///   T_c = T_c(0) A_c p_c / sum over k of q_k p_k
 ///
 /// where A_c is the product of the albedos along the walk and p_c the density of a free walk of
-/// channel c. No weight therefore exceeds one over the probability of free walks.
+/// channel c. Therefore no weight exceeds 1 / q, where q is the probability of selecting a free
+/// walk.
 #pragma once
 
 #include <algorithm>
@@ -36,12 +37,13 @@
 
 namespace wavecomb {
 
-/// Number of collisions after which a walk continues only with probability 1/2 per collision. This
-/// roulette guarantees termination and keeps the mean.
+/// Number of collisions after which a walk survives each further collision only with probability
+/// 1/2. This roulette guarantees that walks end, and does not change the mean.
 inline constexpr uint32_t kLongWalk = 512;
 /// Fraction of the initial light below which a walk is subject to roulette.
 inline constexpr float kFaintWalk = 0.25f;
-/// Fraction of walks that are guided, in a thick body with isotropic scattering.
+/// Fraction of the walks that are guided. The value applies to a thick body with isotropic
+/// scattering.
 inline constexpr float kGuidedFraction = 0.75f;
 
 /// State of a walk before its next collision.
@@ -50,14 +52,16 @@ struct SubsurfaceWalk {
   Vec3<F> o, d;
   Color<F> throughput;
   F first;            ///< sum of the initial throughput over the channels
-  F rest;             ///< distance to the next collision, after begin_flight()
+  F rest;             ///< distance to the next collision; set by begin_flight()
   UInt<F> seed;       ///< seed of the walk's random numbers
   UInt<F> number;     ///< number of collisions so far
   UInt<F> normal;     ///< pack_normal() of the outward surface normal at the entry point
   F choice, flight;   ///< random numbers for the technique and the first distance
   UInt<F> technique;  ///< hero channel, plus kGuided if the walk is guided
-  Color<F> free;      ///< q_k p_k of free walks by channel, relative to the sum over all techniques
-  Color<F> guided;  ///< q_k p_k of guided walks by channel, relative to the sum over all techniques
+  /// q_k p_k of the free technique for each channel, divided by the sum over all techniques.
+  Color<F> free;
+  /// q_k p_k of the guided technique for each channel, divided by the sum over all techniques.
+  Color<F> guided;
 
   static constexpr uint32_t kGuided = 4;
 
@@ -89,13 +93,14 @@ template <typename F>
 inline F sum(const Color<F>& c) {
   return c.x + c.y + c.z;
 }
-/// Returns f(a_c, b_c) for each channel c.
+/// Returns the colour with the components f(a.x, b.x), f(a.y, b.y) and f(a.z, b.z).
 template <typename F, typename Function>
 inline Color<F> each_channel(const Color<F>& a, const Color<F>& b, const Function& f) {
   return {f(a.x, b.x), f(a.y, b.y), f(a.z, b.z)};
 }
-/// Multiplies the densities of the free and guided techniques by those of a step, and updates the
-/// weight of the walk. `through` is the factor of the step on the light of the walk.
+/// Multiplies the densities of all techniques by their densities for one step of the walk, `free`
+/// and `guided`, and updates the weight of the walk. `through` is the factor of the step on the
+/// carried light.
 template <typename F>
 inline void weigh_step(const Color<F>& free, const Color<F>& guided, const Color<F>& through,
                        SubsurfaceWalk<F>& w) {
@@ -107,8 +112,7 @@ inline void weigh_step(const Color<F>& free, const Color<F>& guided, const Color
   w.guided = w.guided * scale;
   w.throughput = w.throughput * through * scale;
 }
-/// Returns s / e by channel. The first flight follows the direction of the lobe with the extinction
-/// of the medium.
+/// Returns s / e for each channel. The first flight of a walk has mu = 0, so s = e.
 template <typename F>
 inline Color<F> guided_density(const SubsurfaceMedium<F>& medium, const SubsurfaceWalk<F>& w) {
   const F mu = select(Mask<F>(w.number == UInt<F>(0u)), F(0.f), dot(w.d, walk_normal(w)));
@@ -162,8 +166,8 @@ inline void begin_flight(const SubsurfaceMedium<F>& medium, SubsurfaceWalk<F>& w
   w.rest = max(F(-log(F(1.f - number)) / extinction), F(1e-30f));
 }
 
-/// Advances a walk by `t`, to a collision where `collides`, otherwise to the surface. Returns the
-/// lanes that continue, without those that have reached the surface.
+/// Advances a walk by the distance `t`. The walk then scatters in the lanes `collides`, and has
+/// reached the surface in all other lanes. Returns the lanes that continue inside the body.
 template <typename F>
 inline Mask<F> end_flight(const SubsurfaceMedium<F>& medium, const F& t, const Mask<F>& collides,
                           SubsurfaceWalk<F>& w) {
@@ -179,7 +183,7 @@ inline Mask<F> end_flight(const SubsurfaceMedium<F>& medium, const F& t, const M
   detail::weigh_step<F>(free, guided, select<F>(collides, free * medium.albedo, free), w);
   w.o = fma(w.d, t, w.o);
 
-  // Random numbers for the collision, independent of those for the flight.
+  // These random numbers are independent of the random numbers for the flight.
   const Sample4<F> r = walk_samples<F>(w.seed, U(w.number + 0x80000000u));
   const F left = detail::sum(w.throughput);
   F q = select(left < F(kFaintWalk) * w.first, F(left / w.first), F(1.f));

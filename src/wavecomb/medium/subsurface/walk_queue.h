@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Subsurface random walks of a wave. All walks take one step at a time, and the remaining ones are
-/// compacted, so that lanes stay full.
+/// Subsurface random walks of a wave. In each iteration, all walks take one step. The walks that
+/// continue are then stored contiguously, so that SIMD lanes stay full.
 #pragma once
 
 #include "wavecomb/accel/embree_accelerator.h"
@@ -10,7 +10,7 @@
 
 namespace wavecomb {
 
-/// End of a walk at the surface.
+/// Surface point where a walk ends.
 template <typename F>
 struct WalkEnd {
   Vec3<F> p, d;  ///< hit point, and direction in which the walk arrived
@@ -20,7 +20,7 @@ struct WalkEnd {
   UInt<F> material, collisions;
 };
 
-/// Columns of walks, in a block that the caller owns.
+/// Queue of subsurface random walks, stored in columns of a memory block that the caller owns.
 ///
 /// Contract: the random numbers of a walk depend only on that walk, so that neither order nor lane
 /// width has an effect.
@@ -33,8 +33,8 @@ class WalkQueue {
 
   static constexpr uint32_t kNoMedium = 0xffffffffu;
 
-  /// Adds the walks in the active lanes. `ray_index` is passed to `finish`, and `slot` is the
-  /// path's slot.
+  /// Adds the walks in the active lanes. `slot` is the slot of the path. run() passes `ray_index`
+  /// to its callback `finish`.
   template <typename F>
   void add(const SubsurfaceWalk<F>& w, const UInt<F>& ray_index, const UInt<F>& slot, const F& time,
            const Mask<F>& active) {
@@ -66,9 +66,10 @@ class WalkQueue {
     size_ = left;
   }
 
-  /// Runs all walks to their end. `keys` are indexed by path slot and specify the object of each
-  /// walk; `keys.salt` is the salt of the ray that entered the object. Calls finish(lanes, who,
-  /// end, came) for walks that have ended. Lanes in `reached_surface` have reached the surface.
+  /// Runs all walks to their end. `keys` are indexed by path slot and specify the object in which
+  /// each walk moves. `keys.salt` is the salt of the ray that entered the object. Calls
+  /// finish(lanes, ray_index, end, reached_surface) for the lanes whose walks have ended. The mask
+  /// `reached_surface` excludes walks that were terminated inside the object.
   template <typename F, typename Finish>
   void run(const SceneView& scene, const EmbreeAccelerator& accel, uint32_t width,
            PresenceKeys keys, uint64_t& steps, uint64_t& lanes, const Finish& finish) {
@@ -181,8 +182,9 @@ class WalkQueue {
             number(kMaterial),
             real(kTime)};
   }
-  /// Stores the active lanes contiguously from `i` on, and returns their number. Up to a packet of
-  /// walks behind the stored walks may be overwritten.
+  /// Stores the active lanes contiguously from `i` on, and returns their number. The function
+  /// writes whole packets, so up to one packet of entries after the stored walks may be
+  /// overwritten.
   template <typename F>
   size_t put(size_t i, const Row<F>& row, const Mask<F>& active) {
     using U = UInt<F>;

@@ -18,7 +18,7 @@
 
 namespace wavecomb {
 
-/// Largest probability of equiangular sampling.
+/// Maximum probability of equiangular sampling.
 inline constexpr float kMaxEquiangular = 0.5f;
 /// Minimum probability of equiangular sampling; smaller values are treated as 0.
 inline constexpr float kMinEquiangular = 0.02f;
@@ -57,8 +57,8 @@ struct MediumSegment {
   F extinction;  ///< extinction of the least attenuated channel, per unit of length
 };
 
-/// Returns the distribution for a segment. The sample values `r` select the light and the point on
-/// it.
+/// Returns the equiangular distribution for a ray segment in a medium. The sample values `r` select
+/// a light and a point on the light.
 template <typename F>
 inline EquiangularDistribution<F> equiangular_distribution(const LightView& lights,
                                                            const MediumSegment<F>& segment,
@@ -80,8 +80,9 @@ inline EquiangularDistribution<F> equiangular_distribution(const LightView& ligh
   distribution.from = atan2(F(begin - distribution.nearest), distribution.height);
   distribution.span = max(
       F(atan2(F(end - distribution.nearest), distribution.height) - distribution.from), F(1e-6f));
-  // q grows with the angle that the segment subtends from the light, and with the transmittance of
-  // the medium from `begin` to the closest point and on to the light.
+  // The probability q is proportional to the angle that the segment subtends from the light. It is
+  // also proportional to the transmittance from `begin` via the point closest to the light to the
+  // light.
   const F before = clamp(F(distribution.nearest - begin), F(0.f), length);
   const F q = F(kMaxEquiangular / kPi) * distribution.span *
               exp(F(-extinction * (before + distribution.height)));
@@ -89,10 +90,10 @@ inline EquiangularDistribution<F> equiangular_distribution(const LightView& ligh
   return distribution;
 }
 
-/// Probabilities, for one channel, of the outcome of a segment that ends after length `x` in a
-/// homogeneous medium, at distance `at` along the ray: the exact probability, and the one of the
-/// sampling technique if the channel is the hero. Where a collision `stopped` the segment, both
-/// probabilities are densities.
+/// Probability, for one colour channel, that a ray travels the length `x` in a homogeneous medium
+/// and stops at distance `at` along the ray. `exact` is the physical probability, and `sampled` the
+/// probability of the sampling technique with the channel as hero. In lanes where a collision
+/// `stopped` the ray, the values are densities over distance.
 template <typename F>
 struct OutcomeDensity {
   F exact, sampled;

@@ -10,7 +10,8 @@ namespace wavecomb {
 /// kNoEvent and `ratio` is 1.
 struct Flights {
   static constexpr uint32_t kNoEvent = 0xffffffffu;
-  static constexpr uint32_t kNoHero = 4;  ///< hero of flights to which volumes no longer apply
+  /// Hero channel of flights whose volume event was dropped.
+  static constexpr uint32_t kNoHero = 4;
 
   float* t;
   uint32_t* material;  ///< material of the volume that stopped the flight
@@ -21,7 +22,7 @@ struct Flights {
   /// Initially 1.
   float* scale[3];
 };
-/// Results that a pass through one volume computes.
+/// Which results of the free flights through a volume to compute.
 enum class FlightResults : uint8_t { kStops, kRatios, kBoth };
 
 /// Selects the hero channel, in proportion to the throughput.
@@ -34,8 +35,8 @@ inline UInt<F> hero_of(const F& u, const Color<F>& throughput) {
 }
 
 /// Returns the weight of a flight. The hero channel is selected in proportion to the path's
-/// throughput T (hero wavelengths, Wilkie et al., "Hero Wavelength Spectral Sampling", 2014). With
-/// p_c the probability of the outcome in channel c, the weight is
+/// throughput T (hero wavelengths, Wilkie et al., "Hero Wavelength Spectral Sampling", 2014). If
+/// p_c is the probability of the sampled outcome in channel c, the weight of channel c is
 ///   p_c sum(T) / sum over channels k of T_k p_k
 /// which keeps sum(T) constant over any number of scatterings.
 template <typename F>

@@ -10,7 +10,7 @@
 
 namespace wavecomb {
 
-/// Transforms a point from world space to a grid's space, whose unit is one brick.
+/// Transforms a point from world space to the space of a grid, in which a brick has edge length 1.
 template <typename F>
 inline Vec3<F> bricks_point(const float (&m)[12], const Vec3<F>& p) {
   const auto row = [&](int i) {
@@ -41,9 +41,9 @@ inline F voxel_value(const GridView& grid, const UInt<F>& brick, const UInt<F>& 
 
 }  // namespace detail
 
-/// Returns the value of a grid at `p`, in the grid's space, by trilinear interpolation: r, g, b, or
-/// a single value three times. A grid without a table is 1 everywhere. `p` lies inside the table,
-/// up to rounding.
+/// Returns the trilinearly interpolated value of a grid at the point `p` in the grid's space. A
+/// grid with a single component returns its value in all three channels. A grid without a table is
+/// 1 everywhere. `p` must lie inside the table, up to rounding error.
 template <typename F>
 inline Color<F> grid_color(const GridView& grid, const Vec3<F>& p, const Mask<F>& active) {
   using U = UInt<F>;

@@ -7,13 +7,13 @@
 namespace wavecomb {
 
 /// Traversal of one grid by a packet, in which each lane follows its own ray (Amanatides and Woo,
-/// "A Fast Voxel Traversal Algorithm", 1987). Lengths are in world space.
+/// "A Fast Voxel Traversal Algorithm", 1987). All distances along the ray are in world space.
 template <typename F>
 class GridTraversal {
   using U = UInt<F>;
 
  public:
-  /// Starts without active lanes.
+  /// Creates a traversal in which no lane is active.
   explicit GridTraversal(const TransformedGrid& transformed)
       : transformed_(transformed),
         grid_(transformed.grid),
@@ -33,8 +33,8 @@ class GridTraversal {
     start(o, d, most, active);
   }
 
-  /// Starts the rays of `lanes` at the part of o + x d, 0 < x < `most`, that is inside the grid's
-  /// table.
+  /// Starts the rays of `lanes`. The traversal covers the part of o + x d, 0 < x < `most`, inside
+  /// the grid's table.
   void start(const Vec3<F>& o, const Vec3<F>& d, const F& most, const Mask<F>& lanes) {
     o_ = select<F>(lanes, bricks_point<F>(transformed_.to_bricks, o), o_);
     d_ = select<F>(lanes, bricks_vector<F>(transformed_.to_bricks, d), d_);
@@ -64,7 +64,7 @@ class GridTraversal {
     }
   }
 
-  /// Returns the lanes that have not reached their end.
+  /// Returns the lanes whose rays have not reached their end.
   const Mask<F>& on() const { return on_; }
   /// Returns the current distance. leave() is the distance at which a lane leaves its cell or ends.
   const F& x() const { return x_; }

@@ -15,7 +15,7 @@ inline bool is_homogeneous(const VolumeRecord& v) {
   return !v.density.grid.table;
 }
 
-/// Returns whether lights guide the distances in a volume (equiangular.h).
+/// Returns whether distances in a volume may be sampled by equiangular sampling (equiangular.h).
 inline bool supports_equiangular(const VolumeRecord& v) {
   return is_homogeneous(v) && std::max({v.albedo[0], v.albedo[1], v.albedo[2]}) > 0;
 }
@@ -44,10 +44,11 @@ struct HomogeneousSegments {
 
 }  // namespace detail
 
-/// Samples free flights through a homogeneous volume, including by lights (equiangular.h).
-/// `segments.most` is the original length of each segment, before any volume stopped it, so that
-/// repeated calls get the same equiangular distribution. kStops samples where flights stop; kRatios
-/// computes the weights after all volumes were sampled.
+/// Samples free flights through a homogeneous volume, including by equiangular sampling
+/// (equiangular.h). `segments.most` is the original length of each segment, before any volume
+/// stopped it, so that repeated calls get the same equiangular distribution. With kStops, the
+/// function samples where flights stop. With kRatios, it computes the weights, after all volumes
+/// were sampled.
 template <typename F>
 inline void sample_homogeneous_flights(const VolumeView& volumes, uint32_t i,
                                        const RaySegments& segments, const Flights& flights,

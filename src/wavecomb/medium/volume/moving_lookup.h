@@ -1,32 +1,34 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Lookup of volume fields at the time of a ray. The value at p is the field's value at p - v(p) t,
-/// where v is the velocity at p and t the time in seconds since the grids were sampled.
+/// Lookup of volume fields at the shutter time of a ray. The value of a moving field at the point p
+/// is the value of its grid at p - v(p) t. v is the velocity at p, and t is the time in seconds
+/// relative to the time of the grids.
 ///
-/// Rays traverse a moving volume by the cells of a grid that bounds the field over the whole
-/// shutter interval (medium/description/volume_motion.h), and a static volume by the cells of the
-/// field's grid. All lanes of a packet traverse the same grid.
+/// In a moving volume, rays traverse cells that bound the field over the whole shutter interval
+/// (medium/description/volume_motion.h). In a static volume, rays traverse the cells of the field's
+/// grid. All lanes of a packet traverse the same grid.
 #pragma once
 
 #include "wavecomb/medium/volume/grid_lookup.h"
 
 namespace wavecomb {
 
-/// Returns the cells for traversing a volume's density.
+/// Returns the grid whose cells rays traverse to sample the density of a volume.
 inline const TransformedGrid& extinction_cells(const VolumeRecord& v) {
   return v.moves ? v.density_cells : v.density;
 }
-/// Returns the cells for traversing a volume's emission.
+/// Returns the grid whose cells rays traverse to sample the emission of a volume.
 inline const TransformedGrid& emission_cells(const VolumeRecord& v) {
   return v.moves ? v.emission_cells : v.emission_field;
 }
 
-/// Returns the seconds at a shutter time from 0 to 1.
+/// Returns the time of a volume in seconds at a shutter time from 0 to 1.
 template <typename F>
 inline F seconds_at(const VolumeRecord& v, const F& time) {
   return fma(time, F(v.seconds_span), F(v.seconds_open));
 }
 
-/// Returns the position, in bricks, at which a field is read for `p`.
+/// Returns the position in the grid of a moving field, in bricks, whose value moves to the point
+/// `p`.
 template <typename F>
 inline Vec3<F> drifted(const FieldDrift& drift, const GridView& velocity, const Vec3<F>& p,
                        const F& seconds, const Mask<F>& active) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Traversal of one volume by many ray segments. A lane that has finished a segment takes the next
-/// one.
+/// Traversal of one volume by many ray segments. A lane that has finished a segment continues with
+/// the next segment.
 #pragma once
 
 #include "wavecomb/core/encoding/hash.h"
@@ -11,7 +11,7 @@
 
 namespace wavecomb {
 
-/// Ray segment in each lane: points o + x d with 0 < x < length.
+/// Packet of ray segments, one in each lane: the points o + x d with 0 < x < `length`.
 template <typename F>
 struct RaySegment {
   Vec3<F> o, d;
@@ -19,7 +19,7 @@ struct RaySegment {
   F time{0.f};  ///< shutter time, if volumes move
 };
 
-/// Columns of ray segments: points o + x d with 0 < x < most.
+/// Ray segments in columns: the points o + x d with 0 < x < `most`.
 struct RaySegments {
   const float *ox, *oy, *oz, *dx, *dy, *dz;
   const float* most;
@@ -29,7 +29,7 @@ struct RaySegments {
   const float* times = nullptr;  ///< shutter times; null without motion
 };
 
-/// Random number sequence of a ray segment in one volume. Each lane has a separate counter.
+/// Sequence of random numbers for a ray segment in one volume. Each lane has a separate counter.
 template <typename F>
 struct CollisionSequence {
   UInt<F> seed{0u}, count{0u};
@@ -50,7 +50,7 @@ struct CollisionSequence {
 
 namespace detail {
 
-/// Returns, for each lane, the number of set lanes before it.
+/// Returns, for each lane, how many lower lanes are set in the mask.
 template <typename F>
 inline UInt<F> ranks(const Mask<F>& lanes) {
   if constexpr (kIsScalar<F>) {
@@ -67,10 +67,9 @@ inline UInt<F> ranks(const Mask<F>& lanes) {
 
 }  // namespace detail
 
-/// Follows ray segments from one collision with the majorant to the next, real or null. Idle lanes
-/// take the next segments once three eighths of the lanes are idle; with a quarter, lanes are
-/// fuller but the total time is longer.
-/// `Visitor` has these functions for the segments of the lanes:
+/// Follows ray segments from one tentative collision (real or null) to the next. Idle lanes take
+/// new segments when three eighths of the lanes are idle. Refilling at a quarter keeps more lanes
+/// busy, but takes longer in total. `Visitor` has these functions for the segments of the lanes:
 ///
 ///   start(way, lanes)    begins these segments
 ///   Mask<F> collide(lanes, x, p, majorant, numbers)    handles a collision at o + x d, at the
@@ -78,7 +77,7 @@ inline UInt<F> ranks(const Mask<F>& lanes) {
 ///                        p of the grid's space, and returns the lanes that end there
 ///   finish(way, lanes)   ends these segments
 ///
-/// The result of a segment does not depend on other segments.
+/// The result of a ray segment does not depend on the other ray segments.
 template <typename F, typename Visitor>
 inline void each_collision(const TransformedGrid& transformed, float scale, uint32_t volume,
                            const RaySegments& segments, VolumeCounts& counts, Visitor& visitor) {

@@ -8,8 +8,8 @@
 /// used, since the minimum of independent exponential distances is exponential with the sum of
 /// their rates.
 ///
-/// The random numbers of collision i in volume v are hashes of (the path's numbers, v, i), so that
-/// the schedule has no effect.
+/// The random numbers of collision i in volume v are hashes of the path's random numbers, v and i,
+/// so that the order of processing has no effect.
 #pragma once
 
 #include "wavecomb/medium/volume/homogeneous.h"
@@ -18,8 +18,8 @@
 
 namespace wavecomb {
 
-/// Random numbers of a ray segment: the sample values of its vertex set, some of which the first
-/// volume uses directly, since they are stratified over a pixel's samples, and a seed for all other
+/// Random numbers of a ray segment. `r` are the sample values of the segment, stratified over a
+/// pixel's samples; the first volume uses some of them directly. `seed` generates all other random
 /// numbers.
 template <typename F>
 struct SegmentRandom {
@@ -31,7 +31,7 @@ struct SegmentRandom {
         seed(float_bits<F>(r.x) ^ hash_u32<UInt<F>>(key.pixel_hash, key.sample)) {}
   SegmentRandom(const MediumQuery<F>& p, VertexSet set)
       : SegmentRandom(p.sampler, p.key, p.depth, set) {}
-  /// Returns a copy with independent random numbers.
+  /// Returns a copy whose `seed` generates independent random numbers.
   SegmentRandom branch(uint32_t number) const {
     SegmentRandom other = *this;
     other.seed = hash_u32<UInt<F>>(seed, UInt<F>(0x2545f491u + number));
@@ -41,7 +41,7 @@ struct SegmentRandom {
 
 namespace detail {
 
-/// Time in seconds, by lane, at which a visitor reads a moving volume.
+/// Time in seconds, for each lane, at which a visitor looks up a moving volume.
 template <typename F>
 class SegmentSeconds {
  public:
@@ -148,15 +148,15 @@ inline bool are_grey(const VolumeView& volumes) {
   return std::all_of(volumes.volumes, volumes.volumes + volumes.count,
                      [](const VolumeRecord& v) { return v.is_grey; });
 }
-/// Returns whether flights have weights other than 1. `distance_lights` holds the lights that guide
-/// distances in homogeneous volumes, or is null.
+/// Returns whether free flights can have weights other than 1. `distance_lights` are the lights for
+/// equiangular sampling, or null.
 inline bool has_flight_weights(const VolumeView& volumes, const LightView* distance_lights) {
   return distance_lights || !are_grey(volumes);
 }
 
-/// Samples the distances at which flights stop, in all volumes, without computing weights.
-/// `scratch` receives the original lengths of the segments, which are `segments.most` and
-/// `flights.t`.
+/// Samples, for all volumes, the distances at which flights stop, without computing weights. On
+/// entry, `segments.most` and `flights.t` hold the lengths of the segments. The function copies
+/// these lengths to `scratch`.
 template <typename F>
 inline void sample_stops(const VolumeView& volumes, const RaySegments& segments,
                          const Flights& flights, float* scratch, const LightView* distance_lights,
@@ -172,9 +172,10 @@ inline void sample_stops(const VolumeView& volumes, const RaySegments& segments,
       detail::sample_flights_in<F>(volumes, i, segments, flights, FlightResults::kStops, counts);
 }
 
-/// Computes the ratios after all stops are known. Flights through volumes sampled first went
-/// further than the final stop, so they are repeated up to the stop with the same random numbers.
-/// In the volume that stopped a flight, the flight keeps its original length and repeats exactly.
+/// Computes the ratios of flights whose final stops are known. In volumes other than the volume
+/// that stopped a flight, the flight may have gone further than its stop. There the flight is
+/// repeated up to the stop, with the same random numbers. In the volume that stopped the flight,
+/// the flight is repeated with its original length.
 template <typename F>
 inline void compute_flight_ratios(const VolumeView& volumes, const RaySegments& segments,
                                   const Flights& flights, float* scratch,
@@ -198,8 +199,8 @@ inline void compute_flight_ratios(const VolumeView& volumes, const RaySegments& 
   }
 }
 
-/// Runs sample_stops() and compute_flight_ratios(). `segments.most` is `flights.t`, and `scratch`
-/// has room for two numbers per segment.
+/// Samples the free flights through all volumes, and computes their weights. `segments.most` must
+/// point to `flights.t`, and `scratch` must have room for two values per segment.
 template <typename F>
 inline void sample_flights(const VolumeView& volumes, const RaySegments& segments,
                            const Flights& flights, float* scratch, const LightView* distance_lights,
@@ -213,7 +214,7 @@ inline void sample_flights(const VolumeView& volumes, const RaySegments& segment
     detail::sample_flights_in<F>(volumes, i, segments, flights, FlightResults::kBoth, counts);
 }
 
-/// Samples one flight in each lane.
+/// Samples the free flight of one ray segment in each lane.
 template <typename F>
 inline Flight<F> sample_flights(const VolumeView& volumes, const MediumQuery<F>& p,
                                 const Color<F>& throughput, const Mask<F>& active,

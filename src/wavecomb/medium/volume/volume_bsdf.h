@@ -76,7 +76,7 @@ class VolumeBsdf : public BsdfTraits {
     F g(0.f);
     Mask<F> in_mesh(false);
     if (v.has_medium_stack()) {
-      // The free flight has already applied absorption.
+      // The weight of the free flight already includes absorption.
       in_mesh = v.active & Mask<F>(v.material == U(v.scene.nested_media.event_material));
       albedo = select<F>(in_mesh, Color<F>(F(1.f)), albedo);
       g = select(in_mesh,
@@ -84,7 +84,7 @@ class VolumeBsdf : public BsdfTraits {
                                  v.path.medium, in_mesh),
                  g);
     }
-    // Handles one volume after the other, with the lanes of the packet that are inside it.
+    // Process one volume after the other, for those lanes of the packet that are inside the volume.
     for (Mask<F> rest = v.active & not_(in_mesh); any(rest);) {
       const uint32_t index = first_active<U>(volume, Mask<U>(rest));
       const VolumeRecord& r = volumes.volumes[index];

@@ -6,9 +6,9 @@
 
 namespace wavecomb {
 
-/// Estimates the radiance that one volume emits along a ray segment, by one point on it. The point
-/// is sampled in proportion to the grid's largest value in each cell, and the estimate includes the
-/// transmittance of all volumes up to the point.
+/// Estimates the radiance that one volume emits along a ray segment, from a single sampled point of
+/// the segment. The point is sampled in proportion to the grid's largest value in each cell, and
+/// the estimate includes the transmittance of all volumes up to the point.
 template <typename F>
 inline Color<F> emission_of(const VolumeView& volumes, uint32_t index,
                             const SegmentRandom<F>& random, const RaySegment<F>& segment,
@@ -34,7 +34,8 @@ inline Color<F> emission_of(const VolumeView& volumes, uint32_t index,
   F before(0.f), x(0.f), greatest(0.f);
   Vec3<F> p(F(0.f));
   each_cell([&](const GridTraversal<F>& traversal, const F& share) {
-    // The last cell that begins before the target value, so that rounding skips no cell.
+    // Select the last cell whose cumulative sum begins at or below the target value, so that
+    // rounding skips no cell.
     const Mask<F> here = traversal.on() & (share > 0.f) & (before <= wanted);
     const F fraction = clamp(F((wanted - before) / select(here, share, F(1.f))), F(0.f), F(1.f));
     const F at = fma(fraction, F(traversal.leave() - traversal.x()), traversal.x());

@@ -11,7 +11,7 @@ Flight<float> Volumes::sample_nested_flight(const MediumQuery<float>& p, const P
                                             PathState<float>& path, Hit& hit,
                                             MediumStackRow<float>& stack) const {
   using F = float;
-  // Make a wave with a single path.
+  // Make a wave that contains a single path.
   alignas(64) float row[kRowWords<PathRow>], row_words[kRowWords<MediumStackRow>];
   store_row<PathRow, F>(row, 0u, path_row<false, F>(path, p.key), true);
   store_row<MediumStackRow, F>(row_words, 0u, stack, true);

@@ -18,21 +18,23 @@
 
 namespace wavecomb {
 
-/// Base of Volumes for subsurface scattering.
+/// Base class of Volumes, which runs subsurface random walks.
 class SubsurfaceScattering {
  public:
-  /// `counts` receives the statistics of walks. `walks` has WalkQueue::kColumns columns.
+  /// `counts` receives the statistics of walks. `walks` is the memory of the WalkQueue, with
+  /// WalkQueue::kColumns columns.
   SubsurfaceScattering(const WaveContext& context, Counts& counts, const SoaBlock& walks)
       : context_(context), counts_(counts), walks_(walks) {}
 
   /// Returns whether the scene has subsurface scattering.
   bool has_subsurface() const { return context_.scene.subsurface.media != nullptr; }
-  /// Runs the walk of the reference integrator for a path whose ray has entered a subsurface body
-  /// and hit `hit`. Query `p` describes the ray segment to the hit. `keys` are the presence keys of
-  /// the ray and include the object. If the walk leaves the body, sets `left_body`, and `path` and
-  /// `hit` describe a ray that views the exit point from outside. Returns false if the walk was
-  /// terminated inside. If the ray does not hit the object, returns true with `path` and `hit`
-  /// unchanged, except that path.pdf becomes 0, since no light sample competes with the path.
+  /// Runs the subsurface random walk of a single path, for the reference integrator. The ray of the
+  /// path has entered a subsurface body and found the hit `hit`. Query `p` describes the ray
+  /// segment to the hit. `keys` are the presence keys of the ray and include the object. If the
+  /// walk leaves the body, sets `left_body`, and `path` and `hit` describe a ray that views the
+  /// exit point from outside. Returns false if the walk was terminated inside. If the ray does not
+  /// hit the object, returns true with `path` and `hit` unchanged, except that path.pdf becomes 0,
+  /// since no light sample competes with the path.
   template <typename Hit>
   bool walk(const MediumQuery<float>& p, const PresenceKeys& keys, PathState<float>& path, Hit& hit,
             bool& left_body) const {
@@ -62,7 +64,8 @@ class SubsurfaceScattering {
                           });
     return left_body;
   }
-  /// Returns the lanes of the rays at `i` that view the exit point of a walk.
+  /// Returns the lanes, of the packet of rays from index `i` on, whose rays view the exit point of
+  /// a walk.
   template <typename F>
   Mask<F> left_body(const Wave& wave, size_t i) const {
     return Mask<F>(load<UInt<F>>(wave.segments.uints(kExit) + i) != UInt<F>(0u));
@@ -112,7 +115,7 @@ class SubsurfaceScattering {
     }
     if (walk_queue.size() == 0) return;
     PresenceKeys keys = presence_keys(wave.pool, depth, false);
-    // The receiver column holds BodyEntry::body (PathRow::take_entry).
+    // The field `receiver` of PathRow holds BodyEntry::body, as set by PathRow::set_entry().
     keys.object = &reinterpret_cast<const PathRow<float>*>(wave.pool.paths)->receiver;
     const auto leave = [&](const Mask<F>& lanes, const U& slot) {
       PathRow<F> path = load_row<PathRow, F>(wave.pool.paths, slot, lanes);
@@ -168,8 +171,8 @@ class SubsurfaceScattering {
     return {fma(end.d, t, end.p), -end.d, t};
   }
 
-  /// Starts walks inside the objects of `keys`. Calls leave(lanes, slot) for paths that hit none of
-  /// the objects, or whose material has no subsurface medium.
+  /// Starts walks inside the objects of `keys`. Calls leave(lanes, slot) for paths whose ray does
+  /// not hit its object, or hits a material without a subsurface medium.
   template <typename F, typename Leave>
   void enter(WalkQueue& walk_queue, const PresenceKeys& keys, uint32_t width,
              const Leave& leave) const {

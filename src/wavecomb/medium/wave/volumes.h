@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Volumes of a scene, media inside its meshes, and subsurface random walks.
+/// Transport through the volumes of a scene, through media inside its meshes, and through
+/// subsurface bodies.
 #pragma once
 
 #include <algorithm>
@@ -35,9 +36,10 @@ class Volumes : public SubsurfaceScattering {
         nested_media_(context.scene, *context.accel, context.traversal_width, nested_media, counts,
                       context.settings->equiangular && has_finite_lights(context.scene.lights)) {}
 
-  /// Samples the free flight of the reference integrator in scenes with nested dielectrics, for the
-  /// path `path` with medium stack `stack`, whose ray with `keys` has hit `hit`. Query `p`
-  /// describes the ray segment to the hit. May change both the path and the hit.
+  /// Samples the free flight of one path of the reference integrator, in scenes with nested
+  /// dielectrics. `stack` is the medium stack of `path`, `keys` are the presence keys of its ray,
+  /// and `hit` is the hit of the ray. Query `p` describes the ray segment to the hit. May change
+  /// both the path and the hit.
   template <typename Hit>
   Flight<float> sample_nested_flight(const MediumQuery<float>& p, const PresenceKeys& keys,
                                      PathState<float>& path, Hit& hit,
@@ -71,7 +73,7 @@ class Volumes : public SubsurfaceScattering {
     return sum;
   }
 
-  // Process all rays of a wave together, and all its unblocked shadow rays.
+  // The following functions process all rays or all unblocked shadow rays of a wave together.
 
   template <typename F>
   void sample_wave_flights(Wave& wave, uint32_t depth, SamplerKind sampler) const {
@@ -102,7 +104,8 @@ class Volumes : public SubsurfaceScattering {
       compute_flight_ratios<F>(volumes_, segments, flights, scratch, distance_lights_,
                                counts_.volumes);
   }
-  /// Returns the flights of the packet of rays at `i`, whose paths have the given throughput.
+  /// Returns the free flights of the packet of rays from index `i` on. `throughput` is the
+  /// throughput of their paths.
   template <typename F>
   Flight<F> flight(const Wave& wave, size_t i, const Color<F>& throughput) const {
     const Flights f = flights_of(wave);
@@ -124,8 +127,8 @@ class Volumes : public SubsurfaceScattering {
     float* most = wave.segments.floats(kDistance);
     for (size_t i = 0; i < q.size; i += kWidth<F>) {
       Mask<F> traced(load<UInt<F>>(q.occluded + i) == UInt<F>(0u));
-      // Includes blocked rays with a coloured shadow, which attenuates the light instead of
-      // removing it.
+      // Attenuate blocked rays as well if their light has a shadow colour, since the light is then
+      // tinted instead of blocked.
       if (wave.pool.shadow_tints) [[unlikely]]
         traced = traced | has_shadow_tint<F>(wave, i);
       store(most + i, select(traced, F(load<F>(q.tfar + i) * (1.f / kShadowRayFraction)), F(0.f)));
@@ -189,8 +192,9 @@ class Volumes : public SubsurfaceScattering {
           return begin_nested_flight<F>(sampler, path.key, depth, path.throughput);
         });
   }
-  /// Returns the start of a ray through media. The random number of the first distance is
-  /// stratified over the pixel's samples, unless volumes use that number.
+  /// Returns the hero channel and the random numbers with which a ray through media starts. In
+  /// scenes without volumes, the random number of the first distance is stratified over the pixel's
+  /// samples. Otherwise volumes use the stratified number.
   template <typename F>
   NestedRayStart<F> begin_nested_flight(SamplerKind sampler, const SampleKey<F>& key,
                                         uint32_t depth, const Color<F>& throughput) const {
@@ -231,7 +235,8 @@ class Volumes : public SubsurfaceScattering {
             q.size,
             wave.times.floats(0)};
   }
-  /// Returns the lanes of the shadow rays at `i` that have a coloured shadow.
+  /// Returns the lanes, of the packet of shadow rays from index `i` on, whose light has a shadow
+  /// colour.
   template <typename F>
   static Mask<F> has_shadow_tint(const Wave& wave, size_t i) {
     const ShadowQueue& q = wave.shadows;
@@ -252,7 +257,7 @@ class Volumes : public SubsurfaceScattering {
   }
 
   const VolumeView volumes_;
-  const LightView* const distance_lights_;  ///< lights that guide distances, or null
+  const LightView* const distance_lights_;  ///< lights for equiangular sampling, or null
   const NestedMedia nested_media_;
 };
 

@@ -2,11 +2,11 @@
 /// Connections of points to the camera: the film position of a point, and the density with which
 /// camera paths find it.
 ///
-/// With M the linear part of the camera-to-world transform, a point at depth s is p = o + s M d',
-/// where d' = (x, y, -1) and o is a point on the lens (for an orthographic camera, on its plane). A
-/// pixel covers the area A = step_x step_y of the window and has one camera path per sample.
-/// Directions from o thus have the density |M d'|^3 / (|det M| A) over solid angle, and a surface
-/// at p, viewed at an angle with cosine cos, has the density G cos over its area, with
+/// Let M be the linear part of the camera-to-world transform. A point at depth s is p = o + s M d',
+/// where d' = (x, y, -1) and o is a point on the lens or, for an orthographic camera, on the camera
+/// plane. A pixel covers the area A = step_x step_y of the window and has one camera path per
+/// sample. Directions from o thus have the density |M d'|^3 / (|det M| A) over solid angle, and a
+/// surface at p, viewed at an angle with cosine cos, has the density G cos over its area, with
 ///   G = |M d'| / (|det M| A s^2);   orthographic:   |M d'| / (|det M| A).
 /// Camera rays and connections sample the lens uniformly, so its density cancels. For a latlong
 /// camera d' is a unit vector, and a pixel covers the solid angle cos(latitude) A, so
@@ -41,14 +41,15 @@ struct CameraSpace {
   }
 };
 
-/// Returns the distance of a point in camera space from the axis through the poles.
+/// Returns the distance of a point in camera space from the polar axis of a latlong camera.
 template <typename F>
 inline F from_axis(const Vec3<F>& q) {
   return sqrt(fma(q.x, q.x, F(q.z * q.z)));
 }
 
-/// Returns G of a point at depth s whose distance from the lens is `stretch` * s. `spread` is s or,
-/// for a latlong camera, the distance of the point from the axis through the poles.
+/// Returns the density G of a point at depth s whose distance from the lens is `stretch` * s.
+/// `spread` is s or, for a latlong camera, the distance of the point from the axis through the
+/// poles.
 template <typename F>
 inline F camera_density(const CameraSetup& camera, const F& det, const F& stretch, const F& s,
                         const F& spread) {
@@ -57,8 +58,8 @@ inline F camera_density(const CameraSetup& camera, const F& det, const F& stretc
   return camera.projection == Projection::kOrthographic ? density : F(density / F(s * spread));
 }
 
-/// Returns 1 / G of the point p that a camera ray along the unit direction d hits, or 0 if p is out
-/// of range.
+/// Returns 1 / G for the point `p` that a camera ray along the unit direction `d` hits, or 0 if `p`
+/// is outside the camera's clipping range.
 template <typename F>
 inline F inverse_camera_density(const CameraSetup& camera, const F& time, const Vec3<F>& p,
                                 const Vec3<F>& d, const Mask<F>& active) {
@@ -85,9 +86,9 @@ struct CameraConnection {
   Mask<F> valid;
 };
 
-/// Connects p to the camera. `u` and `v` in [0, 1) sample the point on the lens. If a latlong image
-/// shows a point several times, this function returns one position, and LightSplatFilter adds the
-/// other positions.
+/// Connects the point `p` to the camera. `u` and `v` in [0, 1) sample the point on the lens. If a
+/// latlong image shows a point several times, this function returns one position, and
+/// LightSplatFilter adds the other positions.
 template <typename F>
 inline CameraConnection<F> connect_to_camera(const CameraSetup& camera, const Vec3<F>& p,
                                              const F& u, const F& v, const F& time,

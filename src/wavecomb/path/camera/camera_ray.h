@@ -15,9 +15,9 @@
 
 namespace wavecomb {
 
-/// Width of a camera ray's cone in pixels. A pixel averages many samples, so that a sample may blur
-/// less than a whole pixel; the full pixel of Igehy's ray differentials would blur textures more
-/// than renderers without ray cones do.
+/// Width of the ray cone of camera rays, in pixels. A pixel averages many samples, so that each
+/// sample may filter textures over less than a pixel. A cone of one pixel, as in Igehy's ray
+/// differentials, would blur textures more than renderers without ray cones do.
 inline constexpr float kConeShare = 0.25f;
 
 /// Camera with its window fitted to an image of width x height pixels, including overscan. A
@@ -26,8 +26,8 @@ struct CameraSetup : Camera {
   std::vector<MatrixStep>
       transforms;        ///< transforms over the shutter interval, if the camera moves
   Vec3<float> backward;  ///< unit vector along the camera's z axis
-  float x0, y1;          ///< upper left corner of the window
-  float step_x, step_y;  ///< window size of a pixel
+  float x0, y1;          ///< upper left corner of the camera's window
+  float step_x, step_y;  ///< size of a pixel on the camera's window
   const float* filter;   ///< FilterTable::offsets()
   bool has_far;          ///< whether a far plane or a clipping plane limits rays
   LensTable distortion;  ///< empty without lens distortion
@@ -40,15 +40,16 @@ struct CameraSetup : Camera {
   CameraSetup(const Camera& camera, uint32_t width, uint32_t height, const FilterTable& table,
               uint32_t overscan = 0);
   bool moves() const { return !transforms.empty(); }
-  /// Returns whether all rays start in one point and stay close to one direction.
+  /// Returns whether this is a pinhole camera: perspective, without lens radius, clipping planes or
+  /// motion.
   bool is_pinhole() const {
     return projection == Projection::kPerspective && lens_radius == 0 && clip_planes.empty() &&
            !moves();
   }
 };
 
-/// Returns the shutter time at which a path of pixel (x, y) sees the scene, given the sampled
-/// `time` of the path in [0, 1).
+/// Returns the shutter time of a path of pixel (x, y). `time` in [0, 1) is the sampled time of the
+/// path within the exposure of the pixel.
 template <typename F>
 inline F camera_time(const CameraSetup& camera, const F& x, const F& y, const F& time) {
   if (camera.rolling_shutter == RollingShutter::kOff) return time;
@@ -150,8 +151,8 @@ inline LocalRay<F> local_ray(const CameraSetup& camera, const F& x, const F& y, 
   return {o, d};
 }
 
-/// Reduces [near, far] to the part of the ray that no clipping plane cuts off; far = near if
-/// nothing remains.
+/// Reduces [near, far] to the part of the ray that no clipping plane cuts off. If nothing of the
+/// ray remains, `far` is set to `near`.
 template <typename F>
 inline void clip(const CameraSetup& camera, const LocalRay<F>& ray, F& near, F& far) {
   for (const auto& [a, b, c, d] : camera.clip_planes) {

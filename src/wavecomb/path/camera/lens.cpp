@@ -9,13 +9,14 @@
 namespace wavecomb {
 namespace {
 
-/// Number of nodes along an edge. In an image of 4,096 pixels, nodes are sixteen pixels apart, and
-/// the interpolation error for strong distortion (k1 = 0.3) is a hundredth of a pixel.
+/// Number of table nodes along an edge of the image. In an image of 4,096 pixels, nodes are sixteen
+/// pixels apart, and the interpolation error for strong distortion (k1 = 0.3) is a hundredth of a
+/// pixel.
 constexpr uint32_t kLensNodes = 257;
 
 using WindowPoint = std::array<double, 2>;
 
-/// Evaluates Brown's model, with y down.
+/// Evaluates Brown's lens distortion model at a point whose y axis points down.
 WindowPoint brown(const Camera& c, const WindowPoint& p) {
   const auto [x, y] = p;
   const double xx = x * x, yy = y * y, xy = x * y, r2 = xx + yy;
@@ -25,8 +26,8 @@ WindowPoint brown(const Camera& c, const WindowPoint& p) {
           y * radial + p1 * (r2 + 2 * yy) + 2 * p2 * xy};
 }
 
-/// Inverts Brown's model at `to` by Newton's method, starting at `p`. Returns false if there is no
-/// solution before the image folds over.
+/// Inverts Brown's model at `to` by Newton's method, starting at `p`. Returns false if the
+/// iteration finds no solution or reaches a point where the model is not invertible.
 bool invert_brown(const Camera& c, const WindowPoint& to, WindowPoint& p) {
   constexpr double kStep = 1e-6, kGood = 1e-9;
   for (int i = 0; i < 50; ++i) {

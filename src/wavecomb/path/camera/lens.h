@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Lens distortion, and the shape of the aperture.
 ///
-/// Distortion moves points within the image. The distortion is stored as a table over the image,
-/// which holds the position at which the ray through an image point would cross the undistorted
-/// image. Brown's model (D. C. Brown, "Close-Range Camera Calibration", Photogrammetric Engineering
-/// 37(8), 1971, in OpenCV's notation) maps a point (x, y) of the plane at distance 1 to its image.
-/// With r^2 = x^2 + y^2 and y down,
+/// Lens distortion is stored as a table over the image. For each image point, the table holds the
+/// position at which the ray through the point would cross an image without distortion. Brown's
+/// model (D. C. Brown, "Close-Range Camera Calibration", Photogrammetric Engineering 37(8), 1971,
+/// in OpenCV's notation) maps a point (x, y) of the plane at distance 1 to its image. With r^2 =
+/// x^2 + y^2 and y down,
 ///   x' = x (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x y + p2 (r^2 + 2 x^2)
 ///   y' = y (1 + k1 r^2 + k2 r^4 + k3 r^6) + p1 (r^2 + 2 y^2) + 2 p2 x y
 /// and the table holds the inverse.
@@ -21,7 +21,8 @@
 
 namespace wavecomb {
 
-/// Mapping from pixels to the camera's window: upper left corner and steps per pixel.
+/// Mapping from pixels to the camera's window: the window's upper left corner, and the size of a
+/// pixel on the window.
 struct PixelGrid {
   float x0, y1, step_x, step_y;
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Sampling of bounces: by the lobes of the BSDF or, with the setting cosine_sampling, by a cosine
-/// distribution for all but delta lobes (as in the dissertation that Wavecomb started from).
+/// Sampling of bounces from the lobes of the BSDF. With the setting `cosine_sampling`, a cosine
+/// distribution replaces all lobes except delta lobes.
 ///
 /// A delta lobe keeps its selection probability q, so the density of a cosine bounce is
 ///   p(wi) = (1 - q) |cos theta_i| / pi
@@ -28,7 +28,8 @@ inline F cosine_bounce_pdf(const Bsdf& bsdf, const Vec3<F>& wo, const View& view
   return select(F(wo.z * wi.z) > 0.f, F(rest * cosine_hemisphere_pdf(abs(wi.z))), F(0.f));
 }
 
-/// Returns the density of bounces along `wi`, where `e` is the evaluated BSDF.
+/// Returns the density with which bounces sample the direction `wi`. `e` is the result of BSDF
+/// evaluation for `wi`.
 template <typename Bsdf, typename F, typename V, typename View>
 WAVECOMB_INLINE F bounce_pdf(const V& v, const Bsdf& bsdf, const Vec3<F>& wo, const View& view,
                              const Vec3<F>& wi, const BsdfEval<F>& e) {

@@ -20,8 +20,8 @@ inline F bounce_weight(const F& bsdf_pdf, const F& light_pdf) {
                 F(bsdf_pdf / select(bsdf_pdf > 0.f, F(bsdf_pdf + light_pdf), F(1.f))), F(1.f));
 }
 
-/// Returns the radiance of emissive surfaces before MIS in scenes with mesh lights. `emission` is
-/// the emission of the surfaces' materials.
+/// Returns the radiance of emissive surfaces, without MIS weight, in scenes with mesh lights.
+/// `emission` is the emission of the surfaces' materials.
 template <typename F>
 [[gnu::noinline]] Color<F> mesh_light_emission(const SceneView& scene, const UInt<F>& inst,
                                                const UInt<F>& geom, const Color<F>& emission,
@@ -40,10 +40,10 @@ template <typename F>
                                 active);
 }
 
-/// Returns the emission of textures and graphs at their finest level in `lanes`, as light samples
-/// and emission sampling use it, and `filtered` in other lanes. Filtered emission has a different
-/// mean wherever emission is cut off, by an edge of the mesh or by the weights of multiple
-/// importance sampling.
+/// Returns the emission of a surface. In `lanes`, textures and graphs are evaluated at the finest
+/// texture level, as in light sampling and emission sampling. In all other lanes, the result is
+/// `filtered`. Filtered emission has a different mean wherever emission is cut off, by an edge of
+/// the mesh or by the weights of multiple importance sampling.
 template <typename F>
 [[gnu::noinline, gnu::cold]] Color<F> finest_emission(const SceneView& scene, const MeshHit<F>& hit,
                                                       const Surface<F>& s, const Vec3<F>& dir,
@@ -58,7 +58,7 @@ template <typename F>
                    filtered);
 }
 
-/// Returns the contribution of a light's own shape that a path hits, including its MIS weight.
+/// Returns the contribution of a light whose shape a path hits, including the MIS weight.
 template <typename F>
 inline Color<F> shape_emission(const SceneView& scene, const ShadeSettings& settings,
                                uint32_t depth, const UInt<F>& light, const F& t,

@@ -18,7 +18,8 @@
 
 namespace wavecomb {
 
-/// Material inputs that a vertex of program `Bsdf` reads: those of its BSDF, and emission.
+/// Material inputs that a vertex with shading program `Bsdf` reads: the inputs of the BSDF, and
+/// emission.
 template <typename Bsdf>
 inline constexpr uint32_t kVertexInputs =
     Bsdf::kInputs | (Bsdf::kEmits ? input_bit(Input::kEmission) : 0u);
@@ -27,7 +28,7 @@ inline constexpr uint32_t kVertexInputs =
 template <typename Bsdf, typename F>
 struct SurfaceHitPoint {
   UInt<F> textured_inputs;  ///< MaterialRecord::textured_inputs
-  Mask<F> reads_texture;    ///< lanes that need uv and a tangent along u
+  Mask<F> reads_texture;    ///< lanes that need texture coordinates and a tangent along u
   bool textured;            ///< whether any lane needs texture coordinates
   Surface<F> s;
 
@@ -45,7 +46,7 @@ struct MaterialLookup {
 };
 
 /// Shading point on a surface. Later steps use only `bsdf`, `throughput` and the member functions,
-/// which volume events also provide. The step `emit` is for surfaces only.
+/// so that volume events can provide the same interface. Only surfaces have the step `emit`.
 template <typename Bsdf, typename F>
 struct SurfaceInteraction : SurfaceHitPoint<Bsdf, F>, MaterialLookup<Bsdf, F> {
   using SurfaceHitPoint<Bsdf, F>::s;
@@ -88,10 +89,10 @@ struct SurfaceInteraction : SurfaceHitPoint<Bsdf, F>, MaterialLookup<Bsdf, F> {
   Vec3<F> tangent() const { return select<F>(this->reads_texture, s.dpdu, Vec3<F>(F(0.f))); }
 };
 
-/// Returns the footprint of a texture lookup `width` wide. Camera rays, and all rays with
-/// filters_all_lookups, filter the whole footprint, since single texels would be noise in the
-/// image. Other lookups after a bounce read one random texel, since the path is noisier than the
-/// texture.
+/// Returns the footprint of a texture lookup `width` wide. Lookups at the first hit filter the
+/// whole footprint, since single texels would be visible as noise. Lookups after a bounce read a
+/// single random texel, since the path is noisier than the texture. The setting
+/// `filters_all_lookups` filters all lookups.
 template <typename F, uint32_t kFeatures>
 WAVECOMB_INLINE Footprint<F> footprint_of(const Vertex<F, kFeatures>& v, const F& width) {
   using U = UInt<F>;
@@ -121,8 +122,8 @@ WAVECOMB_INLINE MaterialLookup<Bsdf, F> look_up_material(const Vertex<F, kFeatur
     footprint = footprint_of<F>(v, F(path.cone_width * s.uv_per_length / sqrt(view_cosine)));
   }
   const auto make_point = [&](const Mask<F>& lanes) {
-    // Copy the inputs of value graphs, so that the originals stay in registers where materials have
-    // no graphs.
+    // Copy the inputs of value graphs, so that the compiler keeps the originals in registers for
+    // materials without graphs.
     const MeshHit<F> at = v.hit;
     const Surface<F> surface = s;
     const Vec3<F> dir = path.dir;

@@ -10,10 +10,11 @@
 /// on which it lies as seen from o_s. Its direction, distance, density and shadow ray start at o_s,
 /// so that the densities of both techniques have the same measure and their weights add up to 1.
 ///
-/// If p has no terminator offset, the two origins differ only by rounding. One sample, taken from
-/// the viewer's side, then serves both sides, and only the length of its shadow ray depends on the
-/// side. If p has a terminator offset, the same random numbers are used from both origins. If both
-/// samples lie on their own sides, one of them is chosen with probability 1/2 and counts twice.
+/// If p has no terminator offset, the two origins differ only by rounding. A single light sample,
+/// taken from the viewer's side, is then used for both sides, and only the length of its shadow ray
+/// depends on the side. If p has a terminator offset, the same random numbers are used from both
+/// origins. If each of the two samples lies on the side of its origin, one sample is chosen with
+/// probability 1/2 and its contribution is doubled.
 #pragma once
 
 #include "wavecomb/core/sampler.h"
@@ -22,8 +23,8 @@
 
 namespace wavecomb {
 
-/// Light sample and the origin of its shadow ray. Direction, distance and density are relative to
-/// that origin.
+/// Light sample and the origin of its shadow ray. Direction, distance and density of the sample are
+/// relative to this origin.
 template <typename F>
 struct LightConnection {
   LightSample<F> light;

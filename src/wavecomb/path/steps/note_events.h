@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Classification of scatterings for light path expressions. Runs only if the render has
-/// expressions.
+/// Classification of scatterings for light path expressions. These functions run only if the render
+/// has light path expressions.
 ///
 /// A BSDF is a sum of lobes, and a direction does not say which lobe scattered the light. A
-/// scattering is therefore split by colour: the fraction f_diffuse / f counts as diffuse, the rest
-/// as glossy.
+/// scattering event is therefore split for each colour channel: the fraction f_diffuse / f counts
+/// as diffuse, and the remaining fraction as glossy.
 #pragma once
 
 #include "wavecomb/core/frame.h"
@@ -15,8 +15,8 @@
 
 namespace wavecomb {
 
-/// Classifies the scattering between `wo` and `wi`. The light's contribution to the diffuse and the
-/// other lobes is scaled by `diffuse` and `specular`.
+/// Classifies the scattering between `wo` and `wi`. The light's multiplier of diffuse lobes is
+/// `diffuse`, and its multiplier of all other lobes is `specular`.
 template <typename Bsdf, typename F>
 inline ScatteringEvent<F> classify_scattering(const Bsdf& bsdf, const Vec3<F>& wo,
                                               const Vec3<F>& wi, const F& diffuse,

@@ -19,7 +19,8 @@
 
 namespace wavecomb {
 
-/// Returns the receiver for light sampling. The receiver's position is set when a light is sampled.
+/// Returns the receiver for light sampling. The position of the receiver is not set yet; it is set
+/// when a light is sampled.
 template <typename Bsdf, typename F, uint32_t kFeatures>
 WAVECOMB_INLINE LightReceiver<F> light_receiver(const Vertex<F, kFeatures>& v,
                                                 const Frame<F>& frame, const Vec3<F>& wo) {
@@ -38,7 +39,7 @@ WAVECOMB_INLINE LightReceiver<F> light_receiver(const Vertex<F, kFeatures>& v,
 
 namespace detail {
 
-/// Light sample that a vertex may use.
+/// Light sample at a vertex, and its contribution.
 template <typename F>
 struct LightCandidate {
   Vec3<F> origin;  ///< origin of the shadow ray
@@ -46,14 +47,14 @@ struct LightCandidate {
   F distance;
   Color<F> c;     ///< contribution if the light is visible, divided by the density
   F w;            ///< MIS weight, included in c
-  Mask<F> valid;  ///< whether the contribution may be non-zero; otherwise c is undefined
+  Mask<F> valid;  ///< whether the contribution may be non-zero; if not, `c` is undefined
   UInt<F> light;
   UInt<F> shadow_set;      ///< for linked lights
   ShadowExtent<F> extent;  ///< extent of the shadow, for lights with shadow attributes
 };
 
-/// Returns the light sample for the sample values `r` in the lanes `active_lights`. `receiver` is
-/// the context's receiver with its position set, and `link` the link class of the surface.
+/// Samples a light with the sample values `r` in the lanes `active_lights`. `receiver` is
+/// VertexContext::receiver with its position set. `link` is the link class of the surface.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Coupling>
 WAVECOMB_INLINE LightCandidate<F> light_candidate(
     const VertexContext<Bsdf, F, kFeatures, Coupling>& c, const LightReceiver<F>& receiver,
@@ -104,12 +105,13 @@ inline constexpr uint32_t kFibreCandidates = 3;
 /// its unoccluded contribution c_i:
 ///   c = c_k sum_i g_i / (n g_k),   k with probability g_k / sum_i g_i
 /// (resampled importance sampling: J. Talbot, D. Cline, P. Egbert, "Importance Resampling for
-/// Global Illumination", 2005). The mean is that of a single light sample for any densities and
-/// weights in c, so the MIS weights stay those of a single sample. Where rays are expensive, as
-/// among strands, a shadow ray to an important light justifies three evaluations
-/// (docs/decisions/light-candidates.md). `first` is the candidate for the sample values `r`. The
-/// other candidates use shifted sample values: evenly over all lights, and on each light by the R2
-/// lattice (M. Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences", 2018).
+/// Global Illumination", 2005). The expected value equals that of a single light sample, for any
+/// densities and MIS weights in c. The MIS weights of a single light sample therefore stay valid.
+/// On hair, where shadow rays are expensive, selecting an important light justifies the evaluation
+/// of several light samples (docs/decisions/light-candidates.md). `first` is the candidate for the
+/// sample values `r`. The other candidates use shifted sample values: evenly over all lights, and
+/// on each light by the R2 lattice (M. Roberts, "The Unreasonable Effectiveness of Quasirandom
+/// Sequences", 2018).
 template <typename F, typename Candidate>
 WAVECOMB_INLINE LightCandidate<F> resample(const LightCandidate<F>& first, const Sample4<F>& r, F u,
                                            const Candidate& candidate) {
@@ -130,7 +132,8 @@ WAVECOMB_INLINE LightCandidate<F> resample(const LightCandidate<F>& first, const
         Sample4<F>{moved(r.x, n / kN), moved(r.y, n * kSteps[0]), moved(r.z, n * kSteps[1]), r.w});
     const F h = brightness(other);
     sum += h;
-    // One random number serves all selections: after rescaling it is uniform again.
+    // The same random number is used for all selections. Rescaling after each selection makes it
+    // uniform again.
     const F q = select(h > 0.f, F(h / select(h > 0.f, sum, F(1.f))), F(0.f));
     const Mask<F> replaces = u < q;
     u = select(replaces, F(u / max(q, F(1e-20f))), F((u - q) / max(F(1.f - q), F(1e-20f))));

@@ -14,7 +14,8 @@
 
 namespace wavecomb {
 
-/// Returns the diffuse fraction of the bounce `b`, by colour; 0 for specular bounces.
+/// Returns the diffuse fraction of the bounce `b` for each colour channel. The fraction is 0 for
+/// delta bounces.
 template <typename F, typename Bsdf, typename View>
 WAVECOMB_INLINE Color<F> diffuse_share(const Bsdf& bsdf, const View& view, const BsdfSample<F>& b) {
   const Color<F> diffuse = bsdf.diffuse_f_cos(view, b.wi);

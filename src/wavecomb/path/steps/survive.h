@@ -23,9 +23,9 @@ inline constexpr float kRouletteGain = 3.f;
 /// The efficiency 1 / (variance x cost) is greatest if the probability of continuing is
 /// proportional to
 ///   sqrt(E[contribution^2] / cost)
-/// of the rest of the path (Bolin and Meyer 1997; Rath et al., "EARS", 2022, eq. 8). The
-/// contribution is the throughput times an unknown incident radiance, which is assumed to be the
-/// same everywhere, so
+/// of the remaining path (Bolin and Meyer 1997; Rath et al., "EARS", 2022, eq. 8). The contribution
+/// is the throughput T times the incident radiance, which is unknown and assumed to be the same for
+/// all paths. The probability q is therefore
 ///   q = kRouletteGain T / sqrt(cost of this material / mean cost),
 /// clamped to [0.05, 1]. Emissive surfaces are always shaded.
 template <typename F>
@@ -42,8 +42,8 @@ inline F cost_aware_survival(const SceneView& scene, const CostSnapshot& costs,
   return select(active & not_(emits), clamp(F(t / sqrt(relative)), F(0.05f), F(1.f)), F(1.f));
 }
 
-/// Returns the random number to compare with cost_aware_survival(). This random number is
-/// independent of the sampler.
+/// Returns the random number of cost-aware roulette. A path continues if the number is below
+/// cost_aware_survival(). This random number is independent of the sampler.
 template <typename F>
 inline F cost_aware_number(const SampleKey<F>& key, uint32_t depth) {
   using U = UInt<F>;
@@ -51,7 +51,8 @@ inline F cost_aware_number(const SampleKey<F>& key, uint32_t depth) {
   return unit_float<F>(hash_u32<U>(path, U(0x5f3759dfu + depth)));
 }
 
-/// Records for AOVs a bounce that survives roulette with probability `q`.
+/// Writes to the AOVs the probability `q` with which the bounce survives roulette, and the
+/// probability with which the guiding field sampled its direction.
 template <typename F, uint32_t kFeatures>
 WAVECOMB_INLINE void record_bounce(const Vertex<F, kFeatures>& v, const GuidingLookup<F>& guiding,
                                    const F& q, const VertexResult<F>& out) {
@@ -62,10 +63,10 @@ WAVECOMB_INLINE void record_bounce(const Vertex<F, kFeatures>& v, const GuidingL
 }
 
 /// Applies roulette after a vertex, with the random number `u` in [0, 1). The survival probability
-/// depends on the throughput or, where training has estimated the expected contribution of bounces,
-/// on that estimate (guiding/roulette.h). The throughput after a guided bounce does not predict its
-/// contribution, since it is smallest in the directions that most light comes from. `arrived` is
-/// the luminance of the throughput at the vertex.
+/// depends on the throughput or, where a trained estimate of the bounce's expected contribution
+/// exists, on this estimate (guiding/roulette.h). The throughput after a guided bounce does not
+/// predict its contribution, since it is smallest in the directions that most light comes from.
+/// `arrived` is the luminance of the throughput at the vertex.
 template <typename F, uint32_t kFeatures>
 WAVECOMB_INLINE void survive(const Vertex<F, kFeatures>& v, const GuidingLookup<F>& guiding,
                              const F& arrived, const F& u, VertexResult<F>& out) {

@@ -9,11 +9,11 @@
 
 namespace wavecomb {
 
-/// Context of the steps after `interact`: references to values that vertex_steps() (path/vertex.h)
-/// has computed once for the vertex.
+/// Context of all steps after `interact`. The members refer to values of the vertex that
+/// vertex_steps() (path/vertex.h) computes once.
 ///
 /// Contract: valid only within vertex_steps(). Steps read the context, and write VertexResult and
-/// the outputs of Vertex. The steps are inlined, so that no reference costs a memory access.
+/// the outputs of Vertex. Since the steps are inlined, the references do not cost memory accesses.
 template <typename Bsdf, typename F, uint32_t kFeatureSet, typename Coupling>
 struct VertexContext {
   using Program = Bsdf;
@@ -29,8 +29,8 @@ struct VertexContext {
   const Interaction& at;             ///< shading point or volume event
   const Frame<F>& frame;             ///< frame of the BSDF's local directions
   const Vec3<F>& wo;                 ///< direction to the viewer, in `frame`
-  const View& view;                  ///< view of the BSDF from `wo`
-  const GuidingLookup<F>& guide;     ///< lookup in the guiding field
+  const View& view;                  ///< result of view(wo) of the BSDF
+  const GuidingLookup<F>& guide;     ///< result of the lookup in the guiding field
   const LightReceiver<F>& receiver;  ///< receiver for light sampling, without a position
   Coupling& joint;                   ///< coupling to the joint transport (joint_transport.h)
 };

@@ -25,13 +25,14 @@ void look_up_field(const GuidingTraining& training, const LearnedQuery& point, L
     out.density[i] = guiding_pdf<float>(view, found, bin_direction(i), true);
 }
 
-/// Counts the lights that evenly spaced random numbers select at the point.
+/// Estimates the selection probabilities of lights at `point`, by counting the lights that evenly
+/// spaced sample values select.
 void count_lights(const Learned& learned, const LearnedQuery& point, LearnedData& out) {
   const Scene& scene = *learned.scene;
-  const LightParts parts = divide_lights(scene, false);  // supplies the names of lights
+  const LightParts parts = divide_lights(scene, false);  // used for the names of lights
   LightView lights = scene.view().lights;
   if (lights.count == 0 || lights.count > kMaxCalibratedLights) return;
-  if (parts.size() == 0) {  // a single light or emissive mesh
+  if (parts.size() == 0) {  // the scene has a single light or emissive mesh
     out.light_shares.emplace_back("the only light", 1.f);
     return;
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Lookup of learned data at a surface point: the guiding distribution and the selection
-/// probabilities of lights. Lookups read the same tables as kernels.
+/// probabilities of lights. The functions read the same tables as the rendering kernels.
 #pragma once
 
 #include <array>
@@ -18,46 +18,47 @@
 
 namespace wavecomb {
 
-/// Data that a render learned before its first pass. These data do not change during the passes.
+/// Results of the pilot renders of a render, which do not change during its passes.
 struct Learned {
   std::shared_ptr<const Scene> scene;              ///< the rendered scene
   bool by_tree = false;                            ///< LightView::by_tree
   std::shared_ptr<const LightCalibration> lights;  ///< null if lights are selected by power
   std::shared_ptr<const GuidingTraining>
-      training;  ///< guiding training, possibly without a guiding field
+      training;  ///< result of guiding training, which may have no guiding field
   std::optional<TransportChoice>
-      transport;  ///< chosen transport, if the settings did not specify it
+      /// Transport that a pilot render chose; empty if the settings specify the transport.
+      transport;
 };
 
 /// Surface point at which learned data is looked up.
 struct LearnedQuery {
-  Vec3<float> p, n;       ///< n: unit normal on the viewer's side
+  Vec3<float> p, n;       ///< `n` is the unit normal on the viewer's side
   uint32_t material = 0;  ///< index into the scene's materials
 };
 
 /// Learned data at a surface point.
 struct LearnedData {
-  /// Axis that the surface faces (one of kGuidingAxes), and whether the guiding field has a region
-  /// at the point.
+  /// `axis` is the axis that the surface faces (one of kGuidingAxes). `known` says whether the
+  /// guiding field has a region at the point.
   uint32_t axis = 0;
   bool known = false;
-  /// Density per steradian of the guiding distribution, if `known`: kGuidingSide rows of
-  /// kGuidingSide bins of the square map of directions (guiding/directions.h).
+  /// Density per steradian of the guiding distribution, empty unless `known` is set. The values are
+  /// kGuidingSide rows of kGuidingSide bins of the square map of directions (guiding/directions.h).
   std::vector<float> density;
   float guided_share = 0;  ///< fraction of bounces that sample the guiding field
-  /// Survival probability of learned roulette for a throughput equal to the brightness of the
-  /// image, before clamping (guiding/roulette.h), or 0 if unknown.
+  /// Survival probability of learned roulette before clamping (guiding/roulette.h), for a path
+  /// whose throughput equals the brightness of the image; 0 if unknown.
   float survival = 0;
-  /// Names of lights and emissive meshes with their selection probability at the point, largest
-  /// first, without those of probability 0. The list is empty if there are no lights or more than
-  /// kMaxCalibratedLights.
+  /// Names and selection probabilities of the lights and emissive meshes that can be selected at
+  /// the point, the most probable light first. The list is empty if the scene has no lights or more
+  /// than kMaxCalibratedLights lights.
   std::vector<std::pair<std::string, float>> light_shares;
 };
 
 /// Number of light selections from which the probabilities are counted.
 inline constexpr uint32_t kCountedChoices = 4096;
 
-/// Looks up the learned data at the surface point `place`.
+/// Looks up the results of the pilot renders at the surface point `place`.
 LearnedData look_up(const Learned& learned, const LearnedQuery& place);
 
 }  // namespace wavecomb

@@ -12,13 +12,13 @@
 namespace wavecomb {
 namespace {
 
-/// Columns of a single hit, as the accelerator writes them.
+/// Hit of a single ray, with the fields that the accelerator writes.
 struct SingleRayHit {
   float t, u, v;
   uint32_t prim, geom, inst;
 };
 
-/// Shutter time at which moving objects are picked: the middle.
+/// Shutter time at which objects are picked, the middle of the shutter interval.
 constexpr float kMiddle = 0.5f;
 
 SingleRayHit trace(const EmbreeAccelerator& accel, const CameraRay<float>& ray) {

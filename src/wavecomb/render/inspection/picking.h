@@ -18,7 +18,7 @@ struct Pick {
   std::string object;            ///< ObjectNames::object
   std::string asset;             ///< ObjectNames::asset
   uint32_t light = kNoLight;     ///< index into Scene::lights; kNoLight for a surface
-  uint32_t material = 0;         ///< for surfaces only, like instance, normal and uv
+  uint32_t material = 0;         ///< set only for surfaces, as are `instance`, `normal` and `uv`
   uint32_t instance = 0;         ///< index into SceneView::instances
   Vec3<float> position, normal;  ///< world space; unit shading normal
   Vec2<float> uv;
@@ -27,8 +27,9 @@ struct Pick {
   float distance = 0;  ///< from the camera
 };
 
-/// Traces the ray through point (x, y) of an image of width x height pixels, with (0, 0) at the top
-/// left corner, through the centre of the lens. Returns nothing if the ray leaves the scene.
+/// Traces the ray from the centre of the lens through the point (x, y) of an image of width x
+/// height pixels, where (0, 0) is the top left corner. Returns the first hit, or nothing if the ray
+/// leaves the scene.
 std::optional<Pick> pick(const Scene& scene, const EmbreeAccelerator& accel, float x, float y,
                          uint32_t width, uint32_t height);
 

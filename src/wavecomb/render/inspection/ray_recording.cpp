@@ -27,7 +27,7 @@ void count(std::vector<uint64_t>& at, uint32_t depth, uint64_t n) {
 
 }  // namespace
 
-/// Output buffers of a thread of replay().
+/// Output buffers of one thread that runs RayRecording::replay().
 struct RayRecording::Buffers {
   HitBuffer hits;
   std::vector<uint32_t> occluded;

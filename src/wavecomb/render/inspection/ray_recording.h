@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Recording of the rays of a render, to trace them again: by Embree alone, which is the upper
-/// limit of speed, or by the accelerator as in a render.
+/// Recording of the rays of a render, for tracing the rays again. The rays can be traced by Embree
+/// alone, which measures the greatest possible speed, or by the accelerator as in a render.
 #pragma once
 
 #include <array>
@@ -21,10 +21,10 @@ inline constexpr size_t kRayKinds = 3;
 
 /// Options of RayRecording::replay().
 struct Replay {
-  bool alone = true;     ///< trace by Embree alone, else by EmbreeAccelerator
+  bool alone = true;     ///< trace the rays by Embree alone instead of by EmbreeAccelerator
   uint32_t threads = 0;  ///< 0 means all hardware threads
-  /// Rays per packet and Embree's coherence flag for each kind of ray. Kinds without a flag use the
-  /// recorded one.
+  /// Rays per packet and Embree's coherence flag, for each kind of ray. A kind of ray without a
+  /// flag uses the flag of the recorded rays.
   std::array<uint32_t, kRayKinds> width{16, 16, 16};
   std::array<std::optional<bool>, kRayKinds> coherent{};
   std::array<bool, kRayKinds> wanted{true, true, true};  ///< kinds to trace
@@ -39,8 +39,8 @@ struct ReplayTimes {
 
 /// Recorded rays of one render of a scene.
 ///
-/// Contract: as for RayRecorder while recording. One thread at a time calls replay(), after the
-/// render.
+/// Contract: while rays are recorded, the contract of RayRecorder applies. After the render, one
+/// thread at a time may call replay().
 class RayRecording final : public RayRecorder {
  public:
   /// Records up to `byte_limit` bytes of rays. Throws Error for scenes with partly present
@@ -53,12 +53,12 @@ class RayRecording final : public RayRecorder {
 
   uint64_t bytes() const { return bytes_; }
   size_t waves() const { return waves_.size(); }
-  /// Closest-hit rays and shadow rays of each path depth.
+  /// Number of recorded closest-hit rays at each path depth; shadow_rays_at() counts shadow rays.
   const std::vector<uint64_t>& rays_at() const { return rays_at_; }
   const std::vector<uint64_t>& shadow_rays_at() const { return shadow_rays_at_; }
 
-  /// Traces all rays again in recorded order. Threads take waves in the order in which the waves
-  /// began. Builds the BVH on first use.
+  /// Traces all rays again in recorded order. Threads process waves in the order in which the waves
+  /// were started in the render. Builds the BVH on first use.
   ReplayTimes replay(const Replay& how);
 
  private:

@@ -11,28 +11,30 @@
 
 namespace wavecomb {
 
-/// Width in pixels of the border around noisy pixels that is sampled with them.
+/// Width in pixels of the border around noisy pixels. The pixels of the border are also sampled.
 inline constexpr uint32_t kDilation = 2;
 
-/// Returns the largest allowed error of a pixel: Settings::adaptive, or the error that every pixel
-/// would have if the image had the mean relative error Settings::noise, spread evenly. If no pixel
-/// exceeds that value but the image still exceeds its noise target (a few bright pixels in the dark
-/// can hold most of the error), returns half of the largest error, so that the render continues.
+/// Returns the largest allowed error of a pixel. The value is Settings::adaptive or, with a noise
+/// target, the error of each pixel if the mean relative error Settings::noise were spread evenly. A
+/// few bright pixels in a dark image can hold most of the error. If the image exceeds its noise
+/// target although no pixel exceeds the value, returns half of the largest error, so that the
+/// render continues.
 double error_threshold(const ErrorMap& map, const Settings& settings);
 
-/// Result of an error check.
+/// Result of the error check of an adaptive render.
 struct AdaptiveCheck {
-  std::vector<uint8_t> active;  ///< indexed by pixel; all 0 if the render is done
+  /// For each pixel: 1 if the pixel needs more samples; all 0 if the render is done.
+  std::vector<uint8_t> active;
   uint64_t active_count = 0;
   /// Expected number of samples of the finished image, if errors fall with the square root of the
   /// sample count.
   uint64_t expected_samples = 0;
 };
 
-/// Checks the pixels of settings.rendered() in a film of `window`. A pixel is active if it, or a
-/// pixel within kDilation of it, is above the threshold and it has fewer than rules.spp samples. No
-/// pixel is active once the mean relative error is within the noise target. A finished pixel
-/// becomes active again if the noise around it rises.
+/// Checks the pixels of settings.rendered() in a film of `window`. A pixel is active if its error,
+/// or the error of a pixel within kDilation, is above the threshold, and it has fewer samples than
+/// the settings allow. No pixel is active once the mean relative error is within the noise target.
+/// A finished pixel becomes active again if the noise around it rises.
 AdaptiveCheck check_adaptive(const ErrorMap& map, const Region& window,
                              std::span<const uint32_t> samples, const Settings& settings,
                              const PassRules& rules);

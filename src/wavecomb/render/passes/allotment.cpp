@@ -12,14 +12,14 @@ namespace wavecomb {
 namespace {
 
 constexpr uint32_t kMinPilot = 8, kMaxPilot = 64, kTimedPilot = 16;
-/// Fraction of the usual brightness of the image below which noise is not visible: darker pixels
-/// are weighted as if they were this bright.
+/// Fraction of the typical brightness of the image below which noise is not visible. Darker pixels
+/// get the weight of a pixel of this brightness.
 constexpr double kDarkShare = 0.25;
 
-/// Measurements of the pilot render.
+/// Measurements of the pilot render, for each pixel.
 struct Pilot {
-  std::vector<double> error;  ///< indexed by pixel: deviation over brightness; negative if unknown
-  std::vector<double> cost;   ///< indexed by pixel: mean cost of a sample; empty if not measured
+  std::vector<double> error;  ///< standard deviation divided by brightness; negative if unknown
+  std::vector<double> cost;   ///< mean cost of a sample; empty if not measured
 };
 
 double light_of(const Film& film, size_t pixel) {
@@ -32,8 +32,8 @@ double light_of(const Film& film, size_t pixel) {
   return std::isfinite(light) ? std::max(0.0, light) : 0.0;
 }
 
-/// Returns the usual brightness of the image: the squared mean of square roots, which a few bright
-/// pixels hardly change.
+/// Returns the typical brightness of the image: the square of the mean square root of all pixels,
+/// which a few bright pixels hardly change.
 double typical_brightness(const Film& film) {
   double root = 0;
   for (size_t i = 0; i < film.pixel_count(); ++i) root += std::sqrt(light_of(film, i));
@@ -64,8 +64,8 @@ Pilot measure(Film& film, bool with_cost) {
   return pilot;
 }
 
-/// Returns the mean over the window around each pixel, without the pixel and without negative
-/// values.
+/// Returns, for each pixel, the mean value of the pixels in the window around it. The mean excludes
+/// the pixel itself and negative values.
 std::vector<double> means_around(const std::vector<double>& values, uint32_t width,
                                  uint32_t height) {
   constexpr auto kSide = static_cast<int64_t>(kAllocationWindow);
@@ -96,8 +96,8 @@ void limit_weights(std::vector<double>& weights) {
   for (double& w : weights) w = mean > 0 ? std::clamp(w / mean, kMinWeight, kMaxWeight) : 1.0;
 }
 
-/// Returns the samples of each pixel beyond the pilot, max(0, scale * weight - pilot), with the
-/// scale for which they add up to `total`.
+/// Returns the number of samples that each pixel gets after the pilot render, max(0, scale * weight
+/// - pilot). `scale` is chosen so that the numbers add up to `total`.
 std::vector<double> fill_up(const std::vector<double>& weights, double pilot, double total) {
   double scale = 0;
   for (int round = 0; round < 64; ++round) {
@@ -142,7 +142,8 @@ std::vector<uint32_t> round_parts(const std::vector<double>& parts, uint64_t tot
         --given;
       }
     }
-    if (given == before) {  // all visited pixels have 0 samples: take the sample from another pixel
+    // all visited pixels have 0 samples, so take the sample from another pixel
+    if (given == before) {
       --*std::find_if(out.begin(), out.end(), [](uint32_t n) { return n > 0; });
       --given;
     }
@@ -187,8 +188,8 @@ SampleAllocation allocate_samples(Film& film, const Settings& settings,
 
   SampleAllocation out{pilot_samples(settings), settings.spp, {}};
   const uint32_t more = out.spp - out.pilot;
-  // Sample counts are multiples of a quantum, so that the samples of a pixel form nets of the Sobol
-  // sequence, and there are few different counts, which keeps waves full.
+  // Sample counts are multiples of a quantum. The samples of a pixel then form nets of the Sobol
+  // sequence. There are also few different counts, which keeps waves full.
   const uint32_t quantum = std::max(1u, std::bit_floor(settings.spp) / 8);
   const uint32_t quanta = more / quantum;
   const size_t count = film.pixel_count();

@@ -6,12 +6,13 @@
 /// the error is least if n is proportional to s / I (Neyman, JRSS 97(4), 1934); error times time is
 /// least if n is proportional to (s / I) / sqrt(c).
 ///
-/// I includes light splats, although the samples of a pixel do not change their noise.
+/// I includes light splats, although more samples of a pixel do not reduce the noise of its light
+/// splats.
 ///
-/// A pixel's count must not depend on its own samples, or its mean is biased. Therefore s / I and c
-/// are means over the surrounding pixels without the pixel itself. A pixel then influences its
-/// count only through the common scale of all weights, to which it contributes through its 24
-/// neighbours.
+/// The sample count of a pixel must not depend on the pixel's own samples, because its mean would
+/// then be biased. Therefore s / I and c are means over the surrounding pixels, without the pixel
+/// itself. A pixel then influences its sample count only through the common scale of all weights,
+/// because the pixel affects the weights of its 24 neighbours.
 #pragma once
 
 #include <span>
@@ -24,19 +25,21 @@ namespace wavecomb {
 
 /// Half width in pixels of the window over which s / I and c are averaged.
 inline constexpr uint32_t kAllocationWindow = 2;
-/// Limits of a pixel's weight, relative to the mean weight. These limits keep a pixel that was dark
-/// by chance from getting too few samples, and a firefly from taking all of them.
+/// Limits of the weight of a pixel, relative to the mean weight. A pixel that was dark by chance
+/// therefore does not get too few samples, and a firefly does not get most of the samples.
 inline constexpr double kMinWeight = 0.125, kMaxWeight = 8;
 
-/// Returns the samples per pixel of the pilot. 0 means that all pixels get the same number, because
-/// the settings ask for it or because there are too few samples.
+/// Returns the samples per pixel of the pilot render. If the result is 0, all pixels get the same
+/// number of samples, either by the settings or because the render has too few samples.
 uint32_t pilot_samples(const Settings& settings);
 
 /// Statistics of an allotment.
 struct AllocationStatistics {
-  uint32_t pilot = 0;            ///< samples per pixel of the pilot; 0 if pixels are sampled evenly
-  uint32_t least = 0, most = 0;  ///< samples of a pixel at the end
-  double gain = 0;               ///< predicted efficiency over even sampling; 0 if unknown
+  /// Samples per pixel of the pilot render; 0 if all pixels get the same number.
+  uint32_t pilot = 0;
+  uint32_t least = 0, most = 0;  ///< smallest and largest number of samples of a pixel at the end
+  /// Predicted efficiency, relative to equal samples for all pixels; 0 if unknown.
+  double gain = 0;
 };
 
 /// Distributes samples so that the mean per pixel is exactly settings.spp and every pixel has at

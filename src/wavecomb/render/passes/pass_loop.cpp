@@ -109,8 +109,8 @@ bool PassLoop::begin_pass(std::span<const uint32_t> samples) {
   const uint64_t active = active_pixels_;
   if (active == 0 || (done >= rules_.spp && !rules_.adaptive)) return false;
   const TimeLeft left{settings_.time_limit - seconds(), samples_per_s_};
-  // A pixel that becomes active again late gets enough samples to reach the count of the other
-  // pixels.
+  // If a pixel becomes active again, it gets enough samples to reach the sample count of the other
+  // active pixels.
   pass_.target = done >= rules_.spp ? rules_.spp : next_target(done, rules_, left, active);
   pass_.light_target = rules_.adaptive && done > 0
                            ? joint_.adaptive_samples(film_, pass_, done, light_done, active)

@@ -23,18 +23,18 @@ namespace wavecomb {
 
 /// Renders passes until the settings' goal is reached: samples, error or time.
 ///
-/// Contract: run() on one thread, within the runner's arena; status() on any thread. The rendered
-/// samples depend on film, settings and pass only, unless there is a time limit.
+/// Contract: one thread calls run(), within the arena of the PassRunner. Any thread may call
+/// status(). Without a time limit, the rendered samples depend only on film, settings and pass.
 class PassLoop {
  public:
-  /// `pass` is the state that belongs to the film, if both come from a checkpoint. Each pass traces
-  /// the paths of `joint` after its camera paths.
+  /// `pass` is the pass state of the checkpoint from which the film was restored, or a new state.
+  /// Each pass traces the paths of `joint` after its camera paths.
   PassLoop(const RenderPlan& plan, PassState pass, Film& film, PassRunner& runner,
            RenderCosts& costs, Watch& watch, JointPasses& joint);
 
   void run();
   RenderStatus status() const;
-  /// State of the pass. Contract: called while no worker runs.
+  /// Returns the state of the current pass. Contract: no worker runs during the call.
   const PassState& pass() const { return pass_; }
   const AllocationStatistics& allocation() const { return allocation_; }
 
@@ -56,7 +56,7 @@ class PassLoop {
   AllocationStatistics allocation_;
   Clock::time_point start_ = Clock::now();
   uint64_t resumed_samples_ = 0;
-  double samples_per_s_ = 0;  ///< speed of the last pass
+  double samples_per_s_ = 0;  ///< rendering speed in the last pass
   std::atomic<bool> may_be_cut_{false};
   std::atomic<uint32_t> passes_{0};
   std::atomic<uint64_t> expected_samples_{0}, active_pixels_{0};

@@ -9,8 +9,8 @@
 namespace wavecomb {
 namespace {
 
-/// Fraction of the time left that a pass may take at the current speed. Ever shorter passes fill
-/// the remaining time.
+/// Fraction of the remaining time that a pass may take at the current speed. Passes become shorter
+/// and shorter towards the time limit.
 constexpr double kPassShare = 0.75;
 
 uint32_t first_check(const PassRules& rules) {

@@ -13,17 +13,19 @@
 
 namespace wavecomb {
 
-/// Adaptive renders check errors at multiples of this many samples per pixel: two blocks of each
-/// half buffer (ErrorSums), and a net of the Sobol sequence.
+/// Adaptive renders check errors at sample counts that are multiples of this number. The number
+/// covers two blocks of each half buffer (ErrorSums), and is a net of the Sobol sequence.
 inline constexpr uint32_t kCheckSamples = 16;
 
-/// Target samples of each pixel if they differ (render/passes/allotment.h).
+/// Target sample counts of pixels, which may differ between pixels (render/passes/allotment.h).
 struct SampleAllocation {
-  uint32_t pilot = 0;            ///< samples of the pilot; 0 if pixels are sampled evenly
-  uint32_t spp = 0;              ///< final mean per pixel
-  std::vector<uint32_t> counts;  ///< final samples by pixel; empty until the pilot is done
+  /// Samples per pixel of the pilot render; 0 if all pixels get the same number.
+  uint32_t pilot = 0;
+  uint32_t spp = 0;  ///< mean sample count per pixel at the end
+  /// Sample count of each pixel at the end; empty until the pilot render is done.
+  std::vector<uint32_t> counts;
 
-  /// Returns the samples of a pixel when the mean is `target`.
+  /// Returns the sample count of a pixel at the time when the mean sample count is `target`.
   uint32_t at(size_t pixel, uint32_t target) const {
     if (counts.empty() || target <= pilot) return target;
     const uint64_t more = counts[pixel] - pilot;
@@ -33,9 +35,11 @@ struct SampleAllocation {
 
 /// State of a pass. A checkpoint stores this state with the film.
 struct PassState {
-  uint32_t target = 0;            ///< samples of each active pixel after the pass, or their mean
-  uint32_t light_target = 0;      ///< samples of each light path after the pass
-  std::vector<uint8_t> active{};  ///< indexed by pixel, row by row: 1 if active; empty if all are
+  /// Sample count of each active pixel after the pass, or the mean if the counts differ.
+  uint32_t target = 0;
+  uint32_t light_target = 0;  ///< number of samples of light paths after the pass
+  /// For each pixel, row by row: 1 if active; empty if all pixels are active.
+  std::vector<uint8_t> active{};
   SampleAllocation allocation{};
 
   bool is_active(size_t pixel) const { return active.empty() || active[pixel] != 0; }
@@ -43,39 +47,41 @@ struct PassState {
 
 /// Settings that determine passes.
 struct PassRules {
-  uint32_t spp = 1;      ///< most samples per pixel
+  uint32_t spp = 1;      ///< maximum number of samples per pixel
   uint32_t min_spp = 0;  ///< in adaptive renders: samples before the first error check
   bool adaptive = false;
   bool timed = false;        ///< whether the render has a time limit
   uint32_t step = 16;        ///< samples that a pass adds if the render is not adaptive
   bool progressive = false;  ///< whether sample counts double from one sample on
-  uint32_t pilot = 0;        ///< sample count at which a pass ends; 0 if pixels are sampled evenly
+  /// Sample count at which the pilot render ends; 0 if all pixels get the same number.
+  uint32_t pilot = 0;
 };
 
-/// Time until the limit, and rendering speed so far.
+/// Time until the time limit, and rendering speed so far.
 struct TimeLeft {
   double seconds = std::numeric_limits<double>::infinity();
   double samples_per_s = 0;
 };
 
 /// Returns whether an adaptive render checks errors when its pixels have `n` samples. The first
-/// check is at min_spp, rounded up to a multiple of kCheckSamples, and the last at spp. Checks at
-/// about n samples are a quarter of the largest power of two below n apart, but at least
-/// kCheckSamples. A pixel therefore gets at most a quarter more samples than it needs, and sample
-/// counts are sums of two or three Sobol nets. The checks depend only on n, so wave size and thread
-/// count do not change the image.
+/// check is at min_spp, rounded up to a multiple of kCheckSamples, and the last at spp. Near n
+/// samples, the distance between two checks is a quarter of the largest power of two below n, but
+/// at least kCheckSamples. A pixel therefore gets at most a quarter more samples than it needs, and
+/// sample counts are sums of two or three Sobol nets. The checks depend only on n, so wave size and
+/// thread count do not change the image.
 bool is_check(uint32_t n, const PassRules& rules);
 
 /// Returns the sample count of the first check after `done` samples.
 uint32_t next_check(uint32_t done, const PassRules& rules);
 
 /// Returns the sample count at the end of a pass that begins with `done` (< spp) samples in each of
-/// `pixels` active pixels. Timed and progressive renders double the count from one sample on. Near
-/// the time limit, passes shrink by powers of two, so that the last pass, which the limit cuts
-/// short, is a short one.
+/// `pixels` active pixels. In timed and progressive renders, the passes end at 1, 2, 4, 8, ...
+/// samples. Near the time limit, passes shrink by powers of two. The last pass, which the limit may
+/// interrupt, is therefore short.
 uint32_t next_target(uint32_t done, const PassRules& rules, const TimeLeft& left, uint64_t pixels);
 
-/// Pixels [begin, end) of a plan, which have the samples [0, first_sample) and get `samples` more.
+/// Batch of a plan: the pixels [begin, end) have the samples [0, first_sample) and get `samples`
+/// further samples.
 struct PassBatch {
   size_t begin, end;
   uint32_t first_sample, samples;
@@ -87,8 +93,8 @@ struct PassPlan {
   uint64_t samples() const;
 };
 
-/// Plans the remaining work of a pass: its active pixels below their target, grouped by sample
-/// count and target, fewest samples first.
+/// Plans the remaining work of a pass. The plan contains all active pixels below their target,
+/// grouped by sample count and target. Pixels with the fewest samples come first.
 ///
 /// `order` holds the rendered pixels (x | y << 16), `window` the pixels of the film, and `samples`
 /// the sample count of each film pixel, row by row. Returns no batches if the pass is done.

@@ -13,21 +13,22 @@
 
 namespace wavecomb {
 
-/// Part of a plan for one worker. The worker renders its waves one after the other, so that each
-/// pixel gets its samples in order.
+/// Group of waves: a part of a plan that one worker renders. The worker renders its waves one after
+/// the other, so that each pixel gets its samples in order.
 struct WaveGroup {
   const uint32_t* pixels;
   uint32_t pixel_count;
   uint32_t first_sample, samples;
-  uint32_t wave_samples;  ///< most samples of a pixel in one wave
+  uint32_t wave_samples;  ///< maximum number of samples of a pixel in one wave
 };
 
-/// Splits a plan into groups. Waves are full, unless workers would get no work.
+/// Splits a plan into groups of waves. Waves are full, except where full waves would leave workers
+/// idle.
 std::vector<WaveGroup> wave_groups(const PassPlan& plan, uint32_t wave_size, uint32_t threads);
 
 /// Runs plans on an integrator.
 ///
-/// Contract: run() is called on one thread, within the arena whose threads are the workers.
+/// Contract: one thread calls run(), within the arena whose threads are the workers.
 class PassRunner {
  public:
   PassRunner(Integrator& integrator, uint32_t threads, uint32_t wave_size);
@@ -40,7 +41,8 @@ class PassRunner {
   const Integrator& integrator() const { return integrator_; }
   uint32_t threads() const { return static_cast<uint32_t>(workers_.size()); }
   uint32_t wave_size() const { return wave_size_; }
-  /// Camera samples and rays so far. May be read while waves run.
+  /// Number of camera samples rendered so far. This function and rays_done() may be called while
+  /// waves run.
   uint64_t samples_done() const { return samples_; }
   uint64_t rays_done() const { return rays_; }
   /// Seconds from construction until the first wave was done.

@@ -8,8 +8,8 @@ namespace wavecomb {
 std::vector<uint32_t> morton_pixel_order(const Region& region) {
   std::vector<uint32_t> order;
   order.reserve(region.pixels());
-  // Blocks of 64 x 64 pixels, row by row, with a Morton curve in each. At most 64 pixels on each
-  // side of the region are visited and skipped.
+  // The order visits blocks of 64 x 64 pixels row by row, and follows a Morton curve in each block.
+  // Pixels of a block outside the region are skipped.
   constexpr uint32_t kBlock = 64;
   for (uint32_t by = region.y0 / kBlock * kBlock; by < region.y1; by += kBlock)
     for (uint32_t bx = region.x0 / kBlock * kBlock; bx < region.x1; bx += kBlock)
