@@ -12,8 +12,8 @@ Efficiency is 1 / (relMSE x seconds). relMSE is the mean of (image - reference 1
 reference 2) / (m^2 + 0.01 of its mean^2), with m the mean of the references: independent noise of
 the references adds nothing on average. Seconds are wall time including training and pilot renders
 but not loading. Results are given for the whole image and for the caustics: pixels where light
-paths contribute more than half of the references. Both figures are also given without the
-thousandth of the pixels with the largest values (``trimmed``).
+paths contribute more than half of the references. Trimmed errors leave out the 0.1 % of the pixels
+with the largest errors.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ class Stage:
         return picture, time.perf_counter() - begin
 
     def samples(self, way: str) -> int:
-        """Estimate the samples that mode `way` takes in ``--seconds``, from short renders."""
+        """Estimate from short renders how many samples mode `way` takes in ``--seconds``."""
         spp, most = 4, self.options.reference // 4
         done, before = 0, 0.0
         while True:
@@ -92,7 +92,7 @@ class Stage:
             spp = min(wanted, 4 * spp)
 
     def errors(self, picture: wavecomb.Picture) -> dict[str, float]:
-        """Return the relMSE of the image and of its caustics, which is 0 without caustics."""
+        """Return the relMSE of the whole image and of its caustics (0 if there are none)."""
         one, other = (np.asarray(picture.beauty, np.float64) - r for r in self.references)
         pixels = (one * other * self.scale).mean(2)
         some = pixels[self.mask] if self.mask.any() else np.zeros(1)

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Measure the speed targets: traversal, lanes, reference, threads, linearity, wave size.
+"""Measure the speed of Wavecomb against its targets.
 
     .venv/bin/python benchmarks/claims.py                       # everything: about 20 minutes
     .venv/bin/python benchmarks/claims.py --only lanes threads  # a part of it
     .venv/bin/python benchmarks/claims.py --quick               # check that it runs
 
-- traversal: trace and shadow phases as a fraction of the render, for each policy; of all thread
-  time, and of the sum of the phases, which excludes idle threads.
-- lanes: shading plus ordering at the widest lanes for each policy, compared with 1 lane without
-  ordering and the widest lanes without ordering.
+- traversal: fraction of the render that the trace and shadow phases take, for each policy. The
+  fraction is given of all thread time, and of the sum of all phases, which excludes idle threads.
+- lanes: time of shading plus ordering with the maximum number of SIMD lanes, for each policy,
+  compared with shading in arrival order on 1 lane and on the maximum number of lanes.
 - reference: the wavefront at 1 lane and with default settings, compared with the scalar depth-first
   reference integrator.
 - threads: speedup of --threads threads over one thread.
@@ -55,7 +55,7 @@ WAVE_SIZES = tuple(4**k for k in range(4, 11))
 """Compared numbers of paths in a wave, from 256 to 2^20."""
 SPP_FACTORS = (0.5, 1, 2, 4)
 EDGE_FACTORS = (0.5, 0.7071, 1, 1.4142)
-"""Factors of the image width, each of which doubles the number of pixels."""
+"""Factors of the image width; each step doubles the number of pixels."""
 
 Choice = dict[str, Any]
 Figures = dict[str, Any]
@@ -148,7 +148,7 @@ def reference_choices(args: argparse.Namespace) -> list[Choice]:
 
 
 def reference(stage: Stage) -> Figures:
-    """Return the wavefront's time at 1 lane over the reference's, and the defaults' speedup."""
+    """Return the wavefront integrator's times relative to the scalar reference integrator."""
     scalar = stage.times(REFERENCE)
     return {
         "one_lane_to_reference": ratio(stage.times(ONE_LANE[0]), scalar),
@@ -217,7 +217,7 @@ def waves_choices(args: argparse.Namespace) -> list[Choice]:
 
 
 def waves(stage: Stage) -> Figures:
-    """The default wave size compared with the best; small images limit the size of waves."""
+    """Compare the default wave size with the fastest; small images limit the size of waves."""
     sizes = [{"wave_size": size} for size in WAVE_SIZES]
     best = stage.quickest(sizes)
     return {

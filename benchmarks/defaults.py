@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compare the default settings with each combination of guiding, light paths and allocation.
+"""Compare the default settings with combinations of guiding, light paths and `allocate`.
 
     .venv/bin/python benchmarks/defaults.py @tuning --ways plain default guided --spp 64
     .venv/bin/python benchmarks/defaults.py room caustics --ways plain default light --reference 0
@@ -111,7 +111,7 @@ def render(scene: Any, way: str, spp: int, seed: int, size: tuple[int, int]) -> 
 
 
 def reference(name: str, scene: Any, options: argparse.Namespace) -> Any:
-    """Return a converged image and its variance by pixel; cached by stage, size and samples."""
+    """Return a converged image and its variance per pixel, from a cached file if there is one."""
     way = STAGES[name].best if name in STAGES else "plain"
     key = hashlib.sha256(f"{name} {way} {options.size} {options.reference}".encode()).hexdigest()
     path = options.folder / f"{Path(name).stem}-{key[:12]}.npy"
@@ -127,7 +127,7 @@ def reference(name: str, scene: Any, options: argparse.Namespace) -> Any:
 
 
 def figures(images: Any, mean: Any, variance: Any) -> dict[str, Any]:
-    """Return error statistics of images; means exclude the variance of the reference."""
+    """Return error statistics of images; the variance of the reference is subtracted from means."""
     scale = 1 / (mean**2 + 0.01)
     errors = ((images - mean) ** 2 * scale).mean(axis=-1).reshape(len(images), -1)
     noise = (variance * scale).mean(axis=-1).ravel()

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Measure edits of a Renderer: camera, material, light and a move of an object.
+"""Measure the time of edits: of the camera, a material, a light, and the move of an object.
 
 For each stage, prints the milliseconds and CPU milliseconds of the first edit of each kind and of
 the fastest of ten further edits. Edits the first material, the first light and the first mesh.
@@ -19,7 +19,7 @@ COUNT = 10
 
 
 def edits_of(renderer, stage):
-    """Returns functions by kind of edit, which take a small number that changes with each edit."""
+    """Returns a function for each kind of edit; its argument is a small amount of change."""
     from pxr import UsdGeom
 
     from wavecomb.usd import LoadReport, open_stage
@@ -48,7 +48,7 @@ def edits_of(renderer, stage):
 
 
 def timed(edit, value):
-    """Returns milliseconds and CPU milliseconds of an edit."""
+    """Returns the wall and CPU milliseconds that an edit takes."""
     start, cpu = time.perf_counter(), time.process_time()
     edit(value)
     return 1e3 * (time.perf_counter() - start), 1e3 * (time.process_time() - cpu)

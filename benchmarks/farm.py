@@ -3,7 +3,7 @@
 
     python benchmarks/farm.py out/mixed.usdc --size 600 400 --spp 64 --workers 2 --rounds 3
 
-With --frames N the camera moves over N frames, and all images are compared bit for bit:
+With --frames N the camera moves, and N frames are rendered in both ways and compared bit for bit:
 
     python benchmarks/farm.py out/mixed.usdc --size 1200 800 --workers 4 --rounds 1 --frames 48
 
@@ -108,7 +108,7 @@ def moving(stage: Path, place: Path, frames: int) -> Path:
 
 
 def differing(place: Path, frames: int) -> int:
-    """Number of frames whose two images differ in any layer."""
+    """Return the number of frames of which the two renders differ in any layer."""
     from wavecomb.image.files.image import read_layers
 
     found = 0
@@ -122,7 +122,7 @@ def differing(place: Path, frames: int) -> int:
 
 
 def main() -> None:
-    """Print the results as JSON; each pair is wall and CPU seconds."""
+    """Print the results as JSON; pairs of numbers are wall seconds and CPU seconds."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("stage", type=Path)
     parser.add_argument("--size", nargs=2, type=int, default=(600, 400))

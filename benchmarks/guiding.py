@@ -7,13 +7,13 @@
 
 Renders each stage in each mode, with several seeds in turn; the first mode is the baseline.
 Mode ``power`` trains nothing, and ``off`` is the default, which calibrates light shares. Other
-modes are names of trained parts, joined by ``+``. Stages are generated in exporter style
-(``--plain``) or files; with the suffix ``-lamps`` they are lit by a key light, a fill light and a
-dim dome. The filter is a box of one pixel. relMSE is that of one image: the variance over seeds at
-each pixel, divided by the square of the mean of all images plus 0.01, since all modes have the same
-mean. Efficiency is 1 / (relMSE x seconds). Seconds are CPU time including training, so that other
-work on the machine has little effect. With ``--seconds``, each render ends after this wall time,
-training included, and seconds are wall time.
+modes are names of trained features in ``PARTS``, joined by ``+``. Stages are generated in exporter
+style (``--plain``) or files; with the suffix ``-lamps`` they are lit by a key light, a fill light
+and a dim dome. The filter is a box of one pixel. relMSE is that of one image: the variance over
+seeds at each pixel, divided by the square of the mean of all images plus 0.01, since all modes have
+the same mean. Efficiency is 1 / (relMSE x seconds). Seconds are CPU time including training, so
+that other work on the machine has little effect. With ``--seconds``, each render ends after this
+wall time, training included, and seconds are wall time.
 """
 
 from __future__ import annotations
@@ -43,14 +43,14 @@ PARTS: dict[str, dict[str, str]] = {
     "paths": {"roulette": "efficient"},
     "directions": {"guiding": "on"},
 }
-"""Settings that enable one trained part each, with all training otherwise off."""
+"""For each trained feature, the settings that enable it while other training is off."""
 
 
 def way(name: str) -> dict[str, str]:
     """Return the settings of a mode: one of WAYS, or PARTS joined by ``+``.
 
     Raises:
-        argparse.ArgumentTypeError: The name is not that of a mode.
+        argparse.ArgumentTypeError: There is no mode of this name.
     """
     if name in WAYS:
         return WAYS[name]

@@ -4,10 +4,11 @@
     .venv/bin/python benchmarks/heavy.py              # 2 GB: minutes to write the stage, once
     .venv/bin/python benchmarks/heavy.py --quick      # check that it runs
 
-Uses the stage of `wavecomb scene heavy`. Every policy renders it at one lane and at the widest, in
-rounds of shuffled order, in one process. A second stage with textures that fit into the caches
-shows the effect of the textures. Prints a Markdown table for each stage and the spread of material
-costs, and writes all results to a JSON file. All images must be bitwise equal.
+Uses the stage of `wavecomb scene heavy`. Every policy renders it with one SIMD lane and with the
+maximum number of lanes, in rounds of shuffled order, in one process. A second stage with textures
+that fit into the caches shows the effect of the textures. Prints a Markdown table for each stage
+and the spread of material costs, and writes all results to a JSON file. All images must be bitwise
+equal.
 
 Results are medians over rounds with 95 % intervals, relative to arrival order in the same round:
 shade + order time (shading including the cost of its order), and the time of the render.
@@ -41,7 +42,7 @@ SMALL_MB = 2.0
 LANES = (0, 1)
 """Numbers of SIMD lanes to compare; 0 means the widest."""
 SEEN = 1000
-"""Materials with fewer shaded records than this are excluded from the spread of costs."""
+"""Materials with fewer shaded hits than this are excluded from the spread of costs."""
 
 
 def main() -> None:
@@ -124,7 +125,7 @@ def render(stage: Any, args: argparse.Namespace, **settings: Any) -> Any:
 
 
 def cost_spread(stats: dict[str, Any]) -> float:
-    """Cost per record of the most expensive material over that of the least expensive one."""
+    """Return the ratio of the highest to the lowest shading time per hit among materials."""
     costs = [m["ns_per_record"] for m in stats["materials"] if m["records"] >= SEEN]
     return max(costs) / min(costs)
 

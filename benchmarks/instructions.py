@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-r"""Count instructions per record and library with valgrind, whatever else the machine does.
+r"""Count instructions per shaded hit with valgrind, which the load of the machine cannot affect.
 
     .venv/bin/python benchmarks/instructions.py cornell.usda                # this tree
     .venv/bin/python benchmarks/instructions.py cornell.usda ../old ../new  # others for comparison
@@ -11,9 +11,9 @@ valgrind does not support AVX-512, so a tree must be built for an older instruct
         --config-settings=cmake.define.WAVECOMB_ARCH=x86-64-v3
 
 Each source tree renders the stage in its Python environment, at 96 x 96 pixels with one thread and
-8 SIMD lanes, once with 4 and once with 20 samples per pixel. The difference in instructions divided
-by the difference in shaded records excludes loading and scene construction. `_core` is everything
-but traversal: camera, ordering, shading, film; `libembree4` is traversal.
+8 SIMD lanes, once with 4 and once with 20 samples per pixel. The difference in instructions is
+divided by the difference in shaded hits, which excludes loading and scene construction. The library
+`_core` does camera rays, ordering, shading and film; `libembree4` does traversal.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def main() -> None:
 
 
 def count(tree: Path, stage: Path, spp: int) -> tuple[int, dict[str, int]]:
-    """Return the shaded records of one render and the instructions of each library."""
+    """Return the number of hits that one render shades, and the instructions of each library."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "counts"
         done = subprocess.run(

@@ -4,8 +4,9 @@
     .venv/bin/python benchmarks/lamps_in_fog.py
 
 For several lights and extinctions, prints the relative variance of a pixel at 32 samples (mean over
-pixels without the worst thousandth), that of the image (sum of variances over sum of squares),
-seconds of one thread, and the gain of both: variance x seconds, off over on.
+pixels without the worst thousandth), the relative variance of the image (sum of variances over sum
+of squares), and the seconds of one thread. The gain of each variance is variance x seconds without
+--equiangular, divided by variance x seconds with it.
 """
 
 from __future__ import annotations
@@ -72,7 +73,7 @@ LAMPS = {
 
 
 def measure(stage: Path, equiangular: str, seeds: int) -> tuple[float, float, float]:
-    """Return the relative variances of pixels and of the image, and seconds."""
+    """Return the relative variances of pixels and of the image, and the CPU seconds taken."""
     loaded = wavecomb.load(stage, lights="hidden")
     pictures, seconds = [], 0.0
     for seed in range(seeds):

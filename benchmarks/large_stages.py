@@ -5,8 +5,8 @@
 
 The benchmark has two kinds of stages, as in production shots. `cache` is one .usdc with the points
 of a sea of a million points for each frame, rendered at one frame. `parts` has a hundred payloads
-with a mesh each, rendered with `--mask` of one. Each stage is compared with a copy without the data
-that the frame does not need.
+with a mesh each, and is rendered with a `--mask` that loads a single payload. Each stage is
+compared with a copy without the data that the frame does not need.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ def render(path: Path, options: tuple[str, ...]) -> tuple[float, float, float]:
 
 
 def sea(side: int, frame: int) -> NDArray[np.float32]:
-    """Points of waves that move, (side^2, 3), with noise that does not compress."""
+    """Return points of a moving sea, (side^2, 3), with noise so that files do not compress well."""
     x = np.linspace(-1, 1, side, dtype=np.float32)
     u, v = np.meshgrid(x, x, indexing="ij")
     rough = np.random.default_rng(frame).random((side, side), np.float32)
@@ -121,7 +121,7 @@ def _new(path: Path) -> Usd.Stage:
 
 
 def _mesh(stage: Usd.Stage, path: str, side: int) -> UsdGeom.Mesh:
-    """A grid of quads without points."""
+    """Return the topology of a grid of quads, without its points."""
     i = np.arange(side * side, dtype=np.int32).reshape(side, side)
     quads = np.stack([i[:-1, :-1], i[1:, :-1], i[1:, 1:], i[:-1, 1:]], -1).reshape(-1)
     mesh = UsdGeom.Mesh.Define(stage, path)

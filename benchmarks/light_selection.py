@@ -10,7 +10,7 @@ with the same seed. Errors are those of the layer `direct`, and of `direct` plus
 that the camera sees directly do not depend on selection. Most of the error of indirect light comes
 from rare paths that end close to a light, which light selection cannot find.
 
-Results, by tree / by power unless stated otherwise:
+Results are ratios of selection by tree to selection by power unless stated otherwise:
 
 - error: relMSE against a render by tree with `--reference` samples per pixel;
 - time: render seconds, median of the rounds with its 95 % interval;

@@ -124,14 +124,14 @@ def measure(name: str, depth: int, args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _calibration_s(scene: Any, depth: int, args: argparse.Namespace) -> float:
-    """Measure the seconds of one calibration for an image of ``--timed-size``."""
+    """Return the seconds that calibrating light shares takes for an image of ``--timed-size``."""
     size = (args.timed_size, args.timed_size)
     stats = wavecomb.render(scene, size=size, spp=1, max_depth=depth, threads=args.threads).stats
     return float(stats["light_calibration"]["seconds"])
 
 
 def error(picture: Picture, truth: Picture, doubt: float) -> tuple[float, float]:
-    """Error of an image and its trimmed error, minus the noise of the reference."""
+    """Return the relMSE and trimmed relMSE of an image, minus the reference's noise."""
     errors = np.sort(((picture - truth) ** 2 / (truth**2 + 0.01)).mean(axis=2).ravel())
     kept = round(len(errors) * (1.0 - OUTLIERS))
     return (

@@ -7,12 +7,12 @@
 Each stage is rendered once with its rays recorded: all rays, by wave and wave stage, in traversal
 order. Embree alone then traces them in the same order on the same number of threads, in a plain
 loop around rtcIntersect and rtcOccluded that fills a packet, calls and counts hits, without filters
-and without storing results. First, each kind of ray (camera, bounce, shadow) is traced at each
-width with coherent and incoherent flags and as the render did, and the fastest way is selected per
+and without storing results. First, each kind of ray (camera, bounce, shadow) is traced with each
+packet width and with each value of Embree's coherence flag, to find the fastest combination for the
 kind. A round then measures, in shuffled order:
 
 - render: the render, without a recorder;
-- alone: wall time of Embree alone, with each kind of ray traced in its fastest way;
+- alone: wall time of Embree alone, with the fastest combination for each kind of ray;
 - calls: the same rays through the accelerator's functions, as the render calls them. The
   accelerator's functions fill packets, keep hits canonical by a filter, and store hits.
 
@@ -21,7 +21,8 @@ Ratios are taken within a round:
 - limit: render / alone, both wall time;
 - traversal: the trace and shadow phases (per thread) / alone;
 - calls: calls / alone, that is the cost of filter, set-up and storing of hits;
-- filter share: (calls - alone) / the trace and shadow phases, the fraction that the filter takes.
+- filter share: (calls - alone) / the trace and shadow phases, which is the fraction of these phases
+  that the filter takes.
 """
 
 from __future__ import annotations
@@ -152,7 +153,7 @@ def _per_kind(recording: Any) -> tuple[int, int, int]:
 
 
 def tune(recording: Any, args: argparse.Namespace) -> dict[str, list[dict[str, Any]]]:
-    """Thread nanoseconds per ray by kind, width and coherence: the minimum of several rounds."""
+    """Return nanoseconds of thread time per ray, for each kind of ray, width and coherence flag."""
     least: dict[tuple[str, int, bool | None], float] = {}
     for _, width, coherent in itertools.product(range(args.tuning_rounds), WIDTHS, COHERENCE):
         try:

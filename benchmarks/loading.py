@@ -4,10 +4,10 @@
     .venv/bin/python benchmarks/loading.py
     .venv/bin/python benchmarks/loading.py --rounds 9 --stages mixed --threads 2 --output my.json
 
-Each turn is a new process that reads a stage, renders it with 1 sample per pixel and writes an EXR
-file, as ``wavecomb render`` does. Stages alternate in shuffled rounds. Times count from just before
-the process starts; files are in the page cache, because one uncounted turn of each stage comes
-first. Writes JSON with every turn, and prints medians with the fastest and slowest turn.
+Each measurement is a new process that reads a stage, renders it with 1 sample per pixel and writes
+an EXR file, as ``wavecomb render`` does. Stages alternate in shuffled rounds. Times count from just
+before the process starts. Files are in the page cache, because each stage is first read once
+without measurement. Writes all measurements as JSON, and prints the median, minimum and maximum.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ print(json.dumps({"start": start, "imports": imports, "load": load, "build": beg
 
 
 def turn(stage: Path, size: int, threads: int) -> dict[str, Any]:
-    """Run one process; return seconds since its start by event, and memory in MB."""
+    """Run one process; return the seconds from its start to each event, and its memory in MB."""
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-c", CHILD, str(stage), os.path.join(folder, "a.exr")]
         begin = time.monotonic()

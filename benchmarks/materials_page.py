@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Render material test stages, and show the images beside what their documentation says.
+"""Render material test stages, and make a page of the images and the stages' documentation.
 
     .venv/bin/python benchmarks/materials_page.py
     .venv/bin/python benchmarks/materials_page.py cornell-box MaterialXTest -o out/looks --spp 256
@@ -43,7 +43,7 @@ class Exhibit:
 
     @property
     def name(self) -> str:
-        """Title, including the selected variants."""
+        """Title of the image: the path of the stage and the selected variants."""
         chosen = [
             word.rpartition("{")[2].replace("}", "")
             for word in self.options
@@ -155,7 +155,7 @@ def document_of(stage: Path) -> Path | None:
 
 
 def said_of(stage: Path) -> str:
-    """Return the first sentence after a stage's name in its README, or the README's first."""
+    """Return the sentence in a README that follows a stage's name, or else its first sentence."""
     document = document_of(stage)
     if document is None:
         return ""

@@ -13,14 +13,14 @@ its mean is biased, mostly towards dark. For each stage and noise target:
 
 Results:
 
-- total bias: mean adaptive image / reference - 1, for the sum of all light, with its standard error
-  over seeds;
-- bias / noise: root mean square bias of pixels over that of the noise of one adaptive render,
-  relative to brightness as in relMSE. Squares of bias come from two halves of the seeds and the two
-  references, (a1 - r1) (a2 - r2), so that noise does not count as bias; negative values mean that
-  no bias was detected;
+- total bias: relative difference of the adaptive images' mean brightness to the reference's, with
+  its standard error over seeds;
+- bias / noise: root mean square of the bias of pixels, divided by the root mean square of the noise
+  of one adaptive render. Bias and noise are relative to brightness, as in relMSE. Squares of bias
+  come from two halves of the seeds and the two references, (a1 - r1) (a2 - r2), so that noise does
+  not count as bias; a negative result means that no bias was detected;
 - error: true mean relative error of one adaptive render, which the target limits;
-- gain: relMSE of the plain renders / that of the adaptive ones, at equal samples.
+- gain: relMSE of the plain renders / relMSE of the adaptive renders, at equal samples.
 """
 
 from __future__ import annotations

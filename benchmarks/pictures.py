@@ -46,7 +46,8 @@ def write_row(
 ) -> None:
     """Write images side by side as PNG or JPEG; ``white`` is the value shown as white.
 
-    ``columns`` is the number per row, by default all; the rest of the last row is black.
+    ``columns`` is the number of images per row, by default all. Empty cells of the last row are
+    black.
     """
     columns = columns or len(images)
     black = np.zeros_like(images[0])
@@ -66,5 +67,5 @@ def write_row(
 
 
 def white_of(reference: Pixels) -> float:
-    """Value to show as white, so that an image is as bright as its reference."""
+    """Return the radiance that pages show as white in an image and its reference."""
     return max(float(np.percentile(reference, 99.5)), 1e-6)

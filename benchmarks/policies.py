@@ -4,11 +4,12 @@
     .venv/bin/python benchmarks/policies.py                       # generated stages, half an hour
     .venv/bin/python benchmarks/policies.py --files shot.usd ...  # and third-party stages
 
-Each stage is rendered with few and many samples, in small, default and large waves, by each policy
-in turns of shuffled order, in one process. Results for a policy and case are shade + order time and
-render time, over those of the best *fixed* policy of the case, which is the one with the lowest
-median. Prints a Markdown table of the worst case of each policy and of every case of the default;
-the JSON has all results. All images of a case must be bitwise equal.
+Each stage is rendered with few and many samples, and in small, default and large waves. All
+policies render each of these cases in shuffled order, in one process. The time of shading plus
+ordering and the render time of each policy are divided by the times of the best *fixed* policy of
+the case, which has the lowest median. Prints a Markdown table of the worst case of each policy, and
+of every case of the default policy. The JSON file has all results. All images of a case must be
+bitwise equal.
 """
 
 from __future__ import annotations
@@ -95,7 +96,7 @@ def _stage(name: str, options: dict[str, Any] | None, args: argparse.Namespace) 
 
 
 def measure(stage: Any, wave: int, spp: int, args: argparse.Namespace) -> dict[str, Any]:
-    """Run all policies on one case."""
+    """Render one case with all policies."""
     shuffle = random.Random(1)
     default = settings()["policy"].default
     policies = [*FIXED, *(p for p in (default, "adaptive") if p not in FIXED)]

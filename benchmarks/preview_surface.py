@@ -46,7 +46,7 @@ class Directions:
         self.wi = np.stack([r * np.cos(phi), r * np.sin(phi), z], axis=-1)
 
     def albedo(self, value: Callable[[Array, Array], Array], z: float) -> float:
-        """Integral of f cos, where `value` is f(wo, wi)."""
+        """Return the albedo at cosine z, where `value` is the BSDF f(wo, wi)."""
         wo = np.array((np.sqrt(1.0 - z * z), 0.0, z))
         return float(np.pi * value(wo, self.wi).mean())
 
@@ -71,7 +71,7 @@ def half(wo: Array, wi: Array) -> tuple[Array, Array]:
 
 
 def ggx(wo: Array, wi: Array, alpha: float, fresnel: Callable[[Array], Array]) -> Array:
-    """D G2 F / (4 z_o z_i) with height-correlated masking."""
+    """Return the GGX BRDF D G2 F / (4 z_o z_i) with height-correlated masking."""
     nh, oh = half(wo, wi)
     a2 = alpha * alpha
     d = a2 / (np.pi * (nh * nh * (a2 - 1.0) + 1.0) ** 2)
@@ -81,7 +81,7 @@ def ggx(wo: Array, wi: Array, alpha: float, fresnel: Callable[[Array], Array]) -
 
 
 def uncoupled(base: float, roughness: float, ior: float) -> Callable[[Array, Array], Array]:
-    """The earlier model's value: (1 - F(o)) (1 - F(i)) / (1 - F_avg) over the base."""
+    """Return the earlier model's BSDF; its base has factor (1 - F(o)) (1 - F(i)) / (1 - F_avg)."""
     z = np.sqrt((np.arange(4096) + 0.5) / 4096)
     mean = float(exact(z, ior).mean())
 
@@ -95,7 +95,7 @@ def uncoupled(base: float, roughness: float, ior: float) -> Callable[[Array, Arr
 def materialx(
     base: float, roughness: float, ior: float, directions: Directions
 ) -> Callable[[Array, Array], Array]:
-    """Value of MaterialX's graph: layer(generalized_schlick_bsdf, oren_nayar_diffuse_bsdf)."""
+    """Return the BSDF of MaterialX: generalized_schlick_bsdf over oren_nayar_diffuse_bsdf."""
     alpha = roughness**2
 
     def value(wo: Array, wi: Array) -> Array:
@@ -107,7 +107,7 @@ def materialx(
 
 
 def glslfx(base: float, roughness: float, ior: float) -> Callable[[Array, Array], Array]:
-    """Value of evaluateLight in previewSurface.glslfx with metallic and clearcoat 0."""
+    """Return the BSDF of evaluateLight in previewSurface.glslfx, without metal and clearcoat."""
     epsilon = 0.001
 
     def value(wo: Array, wi: Array) -> Array:
@@ -126,7 +126,7 @@ def glslfx(base: float, roughness: float, ior: float) -> Callable[[Array, Array]
 def mitsuba_albedos(
     base: float, roughness: float, ior: float, directions: Directions
 ) -> dict[str, list[float]]:
-    """Albedos of Mitsuba's principled and roughplastic, by cosine."""
+    """Return the albedos of Mitsuba's principled and roughplastic for each view cosine."""
     try:
         import mitsuba as mi
     except ImportError:
@@ -212,7 +212,7 @@ def Mesh "Plane" ( prepend apiSchemas = ["MaterialBindingAPI"] ) {{
 
 
 def table(base: float, roughness: float, ior: float, spp: int = 1024) -> dict[str, list[float]]:
-    """Albedos by model, for each of COSINES."""
+    """Return the albedos of each model at the view cosines of COSINES."""
     directions = Directions()
     formulas = {
         "uncoupled": uncoupled(base, roughness, ior),

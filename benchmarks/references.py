@@ -8,8 +8,9 @@ The scenes and images are in ../shared/assets/reference: tests of Autodesk's arn
 Mitsuba 3. The reference is the stored image, or a new render by Mitsuba where a scene has none.
 Mitsuba (make setup-test) also renders each of its scenes twice: unchanged, to check the stored
 image, and with our approximations of its materials, to show their effect. The page, index.html in
-the output folder, has the images of each scene, their difference and the reasons for it, and lists
-what cannot be expressed and why. All errors are relative to the mean of the reference.
+the output folder, has the images of each scene, their difference and the reasons for it. The page
+also lists the features that a stage cannot express, with reasons. All errors are relative to the
+mean of the reference.
 
 Exit code 1 if a scene could not be rendered.
 """
@@ -84,7 +85,7 @@ class Entry:
 
     @property
     def difference(self) -> float:
-        """Relative difference of our image's mean to the reference's mean."""
+        """Difference of our image's mean to the reference's mean, relative to the reference."""
         return self.ours / self.reference - 1.0
 
     def row(self) -> str:
@@ -199,7 +200,7 @@ def mitsuba_entry(mi: Any, file: Path, stored: Path, options: argparse.Namespace
 
 
 def name_of(file: Path) -> str:
-    """Name of a Mitsuba scene."""
+    """Return the name of a Mitsuba scene on the page."""
     return f"mitsuba {file.parent.name}/{file.stem}"
 
 

@@ -5,10 +5,10 @@
     .venv/bin/python benchmarks/scale.py --only instances --count 4000000 --rounds 3
 
 Each stage is written once (below --folder), then read and rendered with 1 sample per pixel by new
-processes, as ``benchmarks/loading.py`` does. Prints medians: seconds to load and to build, and
-memory relative to the minimum. ``prims`` are meshes of 12 triangles, each in a separate Xform;
-``instances`` belong to one point instancer; ``natives`` are native instances; ``triangles`` are in
-one mesh with normals and texture coordinates.
+processes, as ``benchmarks/loading.py`` does. Prints medians of the seconds to load and to build,
+and of the memory relative to the minimum. ``prims`` are meshes of 12 triangles, each in a separate
+Xform; ``instances`` belong to one point instancer; ``natives`` are native instances; ``triangles``
+are in one mesh with normals and texture coordinates.
 """
 
 from __future__ import annotations
@@ -168,7 +168,7 @@ def main() -> None:
 
 
 def _scene_bytes(record: dict[str, Any]) -> int:
-    """Return the memory of arrays, records and BVH in bytes."""
+    """Return the bytes of the mesh arrays, the per-instance records and the BVH."""
     parts = record["memory_bytes"]
     return int(sum(parts[name] for name in ("accelerator", "meshes", "records")))
 

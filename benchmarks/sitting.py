@@ -34,7 +34,7 @@ STAGES = ("cornell", "mixed", "dragon")
 
 
 def sitting_parser(doc: str, name: str) -> argparse.ArgumentParser:
-    """Parser with the common arguments; results go to ``name``.json."""
+    """Return a parser with the common arguments. Results are written to ``name``.json."""
     parser = argparse.ArgumentParser(description=doc.splitlines()[0])
     parser.add_argument("--stages", nargs="+", default=list(STAGES), metavar="NAME")
     parser.add_argument("--rounds", type=int, default=5)
@@ -63,7 +63,7 @@ def sitting_arguments(parser: argparse.ArgumentParser, **quick: Any) -> argparse
 def shuffled_rounds(
     turns: Sequence[T], args: argparse.Namespace, name: str
 ) -> Iterator[Iterator[T]]:
-    """Yield the turns of each round in shuffled order, and log the end of each round."""
+    """Yield each case once per round, in shuffled order, and log the end of each round."""
     shuffle = random.Random(args.seed)
     started = time.perf_counter()
     for number in range(args.rounds):
@@ -110,7 +110,7 @@ def phase_times(stats: Mapping[str, Any]) -> dict[str, float]:
 
 
 def bootstrap(values: Any, statistic: Callable[[Any], Any] = np.median) -> tuple[float, float]:
-    """95 % percentile bootstrap interval of a statistic over rounds."""
+    """Return the 95 % percentile bootstrap interval of a statistic over rounds."""
     if len(values) < 2:
         value = float(statistic(np.asarray(values)))
         return value, value
@@ -122,7 +122,7 @@ def bootstrap(values: Any, statistic: Callable[[Any], Any] = np.median) -> tuple
 
 
 def summary(values: Sequence[float]) -> dict[str, float]:
-    """Median over rounds, its bootstrap interval, and the range."""
+    """Return the median over rounds, its bootstrap interval, the minimum and the maximum."""
     low, high = bootstrap(np.asarray(values))
     return {
         "median": float(np.median(values)),
@@ -187,7 +187,7 @@ def row(*cells: str) -> str:
 
 
 def show(figure: Mapping[str, float], digits: int = 3) -> str:
-    """Median and interval as text."""
+    """Return a median and its interval as text."""
     median, low, high = (f"{figure[key]:.{digits}f}" for key in ("median", "low", "high"))
     return f"{median} ({low} to {high})"
 

@@ -7,8 +7,8 @@
 Stages are rendered with 1 and 2 threads, and with 4, 8, 16 and more up to the number of cores, in
 turns of shuffled order, in one process. ``measured`` is the ratio of render times within a round.
 ``by groups`` is predicted from the times of groups of waves (``sharing`` in docs/statistics.md), by
-list scheduling of each pass; the rest of the render counts unchanged. Prints a table and writes
-``results/threads.json``.
+list scheduling of each pass. Time outside of these groups counts unchanged. Prints a table and
+writes ``results/threads.json``.
 """
 
 from __future__ import annotations

@@ -40,7 +40,7 @@ ASSETS = Path(__file__).resolve().parents[2] / "shared" / "assets"
 CAMERAS = {"iesTest": ("/cameras/iesTop", "/cameras/iesBottom")}
 """Stages whose reference has an image of each camera, one above the other."""
 VISIBLE = ("visibleRect",)
-"""Stages whose lights are visible."""
+"""Stages of which the reference images show the lights."""
 LAMBERT = """#usda 1.0
 over "materials" {
     over "usdpreviewsurface1" {
@@ -62,8 +62,8 @@ NOT_REACHED = {
         "the delegate's 1 - cos(0.265 degrees) is 179 steps of a float for 179.45: 0.25 % too dark",
     ),
 }
-"""Reasons why stages and images do not pass. The means of these images must still be within 0.5
-%."""
+"""Reasons why images of stages do not agree with their references. The means of these images must
+still be within 0.5 %."""
 NAME = re.compile(r"(?P<stage>\w+)-embree\.(?P<frame>\d+)\.exr")
 
 PAGE = """<!doctype html>
@@ -98,7 +98,7 @@ class Entry:
 
     @property
     def is_good(self) -> bool:
-        """Whether the image agrees with its reference as far as required."""
+        """Whether the image passes the comparison with its reference."""
         v = self.verdict
         return v.agrees or (bool(self.reason) and v.mean_agrees)
 
@@ -131,7 +131,7 @@ class Entry:
 def render(
     stage: Path, frame: int, camera: str | None, spp: int, options: argparse.Namespace
 ) -> NDArray[np.float64]:
-    """Independent renders of a frame, (batches, height, width, 3)."""
+    """Return independent renders of a frame as an array (batches, height, width, 3)."""
     lambert = options.out / "lambert.usda"
     lambert.write_text(LAMBERT, encoding="utf-8")
     lights = "visible" if stage.stem in VISIBLE else "hidden"

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Test whether an image equals a reference within their noise.
 
-Our image comes as independent renders (batches). The reference is a single image with an unknown
-number of samples. The noise of the reference is estimated per block from the differences between
-neighbouring pixels of *reference - ours*, minus the part due to our noise. Other differences
-between neighbouring pixels, such as differently filtered outlines, therefore count as noise.
+Our image consists of several independent renders, called batches. The reference is a single image
+with an unknown number of samples. The noise of the reference is estimated per block from the
+differences between neighbouring pixels of *reference - ours*, minus the part due to our noise.
+Other differences between neighbouring pixels, such as differently filtered outlines, therefore
+count as noise.
 
 Noise is assumed to be independent between pixels, so that the variance of a block is the sum over
 its pixels; z is a normal deviate.
@@ -37,13 +38,14 @@ class Verdict:
 
     Attributes:
         difference: Relative difference of the mean to the reference's.
-        worst: Largest deviate among blocks that differ by more than rounding.
+        worst: Largest deviation of a block, in standard errors, among blocks that differ by more
+            than rounding.
         limit: Limit of ``worst``.
-        outside: Number of blocks and channels beyond the limit.
-        blocks: Number of all blocks and channels.
-        noise: Relative standard error of the mean, of both images.
+        outside: Number of pairs of a block and a channel whose deviation exceeds `limit`.
+        blocks: Number of all pairs of a block and a channel.
+        noise: Standard error of `difference`, from the noise of both images.
         place: Column and row of the worst block, in blocks.
-        excess: Relative difference of the worst block.
+        excess: Relative difference between the two images in the worst block.
     """
 
     difference: float
@@ -62,7 +64,7 @@ class Verdict:
 
     @property
     def mean_is_open(self) -> bool:
-        """Whether the means differ by over 0.5 %, but by less than that plus 3 standard errors."""
+        """Whether the means differ by over 0.5 %, but by at most 0.5 % plus 3 standard errors."""
         return 0 < abs(self.difference) - MEAN_LIMIT <= 3 * self.noise
 
     @property

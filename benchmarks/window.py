@@ -22,7 +22,7 @@ os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 
 def noise_of(image):
-    """Mean difference of an image to its median of 3 x 3 pixels, relative to its mean."""
+    """Return the noise of an image: its mean difference to a 3 x 3 median filter over its mean."""
     import numpy as np
 
     tone = np.sqrt(np.clip(image.mean(axis=2), 0.0, 1.0))
@@ -59,7 +59,7 @@ class Run:
         self.last = time.perf_counter()
 
     def until(self, met, seconds=120.0):
-        """Wait for a condition; return the time when it was met."""
+        """Wait until a condition is met; return the time at that moment."""
         end = time.perf_counter() + seconds
         while not met():
             if time.perf_counter() > end:

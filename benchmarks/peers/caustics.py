@@ -5,10 +5,11 @@
     python benchmarks/peers/caustics.py caustics lens pool prism --seconds 20
     python benchmarks/peers/caustics.py caustics --quick        # check that it runs
 
-A pilot render determines how many samples each renderer takes in ``--seconds``; then they render in
-rounds of shuffled order. A sheet shows the images, three to a row, after the reference, which is
-Wavecomb's with light paths merged within half a pixel and other seeds. relMSE is the mean of (x -
-r)^2 / (r^2 + 0.01 mean(r)^2) without the worst thousandth of the pixels, for the whole image and
+A pilot render determines how many samples each renderer takes in ``--seconds``. The renderers then
+run in rounds of shuffled order. A contact sheet shows the reference and then the images, three to a
+row. The reference is rendered by Wavecomb with other seeds and with light paths merged within half
+a pixel. relMSE is the mean of (x - r)^2 / (r^2 + 0.01 mean(r)^2) without the worst thousandth of
+the pixels, for the whole image and
 for the caustics: pixels whose light in the reference comes mostly from light paths. Materials are
 converted as mitsuba_bridge.py and cycles_bridge.py describe. Where a peer's material is an
 approximation, its error includes the difference, so means are printed as well. Mitsuba's ptracer
@@ -134,7 +135,7 @@ def measure(name: str, args: argparse.Namespace) -> dict[str, Any]:
 
 
 def prepare(name: str, args: argparse.Namespace) -> Job:
-    """The stage, and its arrays for the peers."""
+    """Write the stage and its arrays, which Mitsuba and Cycles load."""
     from recording import record
     from stages import write_stage
 
@@ -162,7 +163,7 @@ def picture(
 
 
 def samples(process: Process, args: argparse.Namespace) -> int:
-    """Samples that fit into the time; squares, as Mitsuba's multijitter requires."""
+    """Return the number of samples that fit into ``--seconds``, as a square for multijitter."""
     spp = 4
     while True:
         process.render(spp, TRIAL_SEED)  # compiles kernels
@@ -174,7 +175,7 @@ def samples(process: Process, args: argparse.Namespace) -> int:
 
 
 def reference(job: Job, args: argparse.Namespace) -> tuple[Image, NDArray[np.bool_]]:
-    """A converged image, and a mask of pixels whose light comes mostly from light paths."""
+    """Return a converged image, and a mask of pixels that get most light from light paths."""
     import wavecomb
     from wavecomb.image.compare.comparison import luminance
 

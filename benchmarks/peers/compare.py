@@ -12,14 +12,15 @@ All renderers use the same arrays, camera, box filter and path depth, without de
 adaptive sampling. Roulette is each renderer's default. mitsuba_bridge.py and cycles_bridge.py
 describe the conversion of materials.
 
-- Speed: in each round every renderer starts in a new process, in shuffled order. Each renderer
-  loads the stage (Wavecomb reads USD, the others read the arrays that Wavecomb's loader made),
-  renders one sample (start to first image), then an image with few and one with many samples. The
-  marginal rate is the difference in samples over the difference in time. Peak memory is that of the
-  renderer's process.
-- Noise: relMSE = mean of (x - r)^2 / (r^2 + 0.01) at equal samples, minus the error of r; mean over
-  seeds. r is each renderer's converged image with other seeds. Noise does not depend on the load of
-  the machine; images are cached in --cache by version and settings.
+- To measure speed, every round starts each renderer in a new process, in shuffled order. Each
+  renderer loads the stage (Wavecomb reads USD, the others read the arrays that Wavecomb's loader
+  made), renders one sample (start to first image), then an image with few and one with many
+  samples. The marginal rate is the difference in samples over the difference in time. Peak memory
+  is that of the renderer's process.
+- Noise: relMSE is the mean of (x - r)^2 / (r^2 + 0.01) over pixels and seeds at equal samples,
+  minus the error of r. The reference r is the same renderer's converged image with other seeds.
+  Noise does not depend on the load of the machine; images are cached in --cache by version and
+  settings.
 - Efficiency is 1 / (relMSE * seconds), with seconds by the marginal rate at full size.
 
 Ratios of Wavecomb to the others are medians within rounds, with a 95 % bootstrap interval.
@@ -175,7 +176,7 @@ def arguments() -> argparse.Namespace:
 
 
 def told() -> list[str]:
-    """The command line without file locations."""
+    """Return the command line without file locations."""
     words = iter(sys.argv[1:])
     out = []
     for word in words:

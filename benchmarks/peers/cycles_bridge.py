@@ -6,8 +6,9 @@ Needs the environment of benchmarks/peers/setup and a separate process.
 Rect and disk lights become area lights (one-sided, invisible to rays), spheres become point lights
 with a radius, distant lights become suns, and the dome becomes the world. Emissive meshes emit to
 both sides, as in Wavecomb. Instances of one mesh and material share their data; Cycles copies a
-mesh for each material. Metal is F82 tint with multiple scattering, as in Wavecomb. Glass, plastic
-and principled become Principled, whose layers are the closest equivalent.
+mesh for each material. Metal uses the F82-tint model with multiple scattering, as in Wavecomb. The
+programs `dielectric`, `plastic` and `principled` become Cycles' Principled BSDF, whose layers are
+the closest equivalent.
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ from recorded import INHERIT, Curves, Mesh, Recorded
 Matrix = NDArray[np.float64]
 
 _DOME = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-"""Rotation from the dome's frame (pole +Y, image centre +Z) to Cycles' (pole +Z, centre +X)."""
+"""Rotation from a dome light's frame (pole +Y, centre +Z) to that of Cycles (pole +Z, centre
++X)."""
 
 
 @dataclass(frozen=True)

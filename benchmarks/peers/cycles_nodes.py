@@ -23,7 +23,7 @@ class Nodes:
         tree.nodes.clear()
 
     def add(self, kind: str, **inputs: Any) -> Any:
-        """Add a node. Keywords set inputs to values or sockets; underscores mean blanks."""
+        """Add a node. Keywords connect or set its inputs; "_" in a keyword stands for a blank."""
         node = self.tree.nodes.new(kind)
         for name, value in inputs.items():
             socket = node.inputs[name.replace("_", " ")]
@@ -51,7 +51,7 @@ class Nodes:
         return node.outputs["Vector"]
 
     def texture(self, use: dict[str, Any], signed: bool = False) -> Any:
-        """Add a texture lookup: texel * scale + bias; `signed` omits a normal map's 2 n - 1."""
+        """Add a lookup of texel * scale + bias; `signed` leaves texels of normal maps in [0, 1]."""
         node = self.tree.nodes.new("ShaderNodeTexImage")
         node.image, node.extension = self.images.get(use["texture"])
         a, b, c, d, e, f = use.get("uv", (1.0, 0.0, 0.0, 0.0, 1.0, 0.0))
@@ -106,7 +106,7 @@ class Images:
 
 
 def image(values: NDArray[np.float32], space: str, small: bool) -> Any:
-    """Make an image of (height, width, 1 to 4) values, top row first."""
+    """Make a Blender image from an array (height, width, 1 to 4 channels), top row first."""
     height, width, channels = values.shape
     four = np.ones((height, width, 4), np.float32)
     four[:, :, :channels] = values
@@ -187,7 +187,7 @@ def _metal(nodes: Nodes, m: dict[str, Any]) -> Any:
 
 
 def _dielectric(nodes: Nodes, m: dict[str, Any]) -> Any:
-    """Convert glass that tints transmission only; Principled takes the colour's square root."""
+    """Convert glass. Its tint is squared because Principled transmits the root of base colour."""
     tint = np.asarray(m.get("base_color", (1.0,) * 3))
     node = nodes.add(
         "ShaderNodeBsdfPrincipled",
@@ -202,7 +202,7 @@ def _dielectric(nodes: Nodes, m: dict[str, Any]) -> Any:
 
 
 def _principled(nodes: Nodes, m: dict[str, Any]) -> Any:
-    """Convert principled, and plastic as a diffuse base under a dielectric interface."""
+    """Convert `principled`, and `plastic`, a diffuse base under a dielectric interface."""
     node = nodes.add(
         "ShaderNodeBsdfPrincipled",
         Base_Color=nodes.parameter(m, "base_color", (0.18,) * 3),
@@ -218,7 +218,7 @@ def _principled(nodes: Nodes, m: dict[str, Any]) -> Any:
 
 
 def _openpbr(nodes: Nodes, m: dict[str, Any]) -> Any:
-    """Convert OpenPBR's base, specular, coat and subsurface, not film, fuzz and transmission."""
+    """Convert the base, specular, coat and subsurface lobes of OpenPBR, and ignore other lobes."""
     layers = m.get("openpbr", {})
     below = float(layers.get("subsurface_weight", 0.0))
     radius = np.asarray(layers.get("subsurface_radius", (0.0,) * 3), np.float64)
@@ -243,7 +243,7 @@ def _openpbr(nodes: Nodes, m: dict[str, Any]) -> Any:
 
 
 def _hair(nodes: Nodes, m: dict[str, Any]) -> Any:
-    """Convert hair by its multiple-scattering colour; graphs per strand are ignored."""
+    """Convert hair by its multiple-scattering colour; value graphs per strand are ignored."""
     node = nodes.tree.nodes.new("ShaderNodeBsdfHairPrincipled")
     node.model = "CHIANG"
     node.parametrization = "COLOR"

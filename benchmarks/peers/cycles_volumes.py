@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Convert recorded volumes to Cycles: grids by the .vdb files of ``write_volumes``, or boxes."""
+"""Convert recorded volumes to Cycles. Grids are read from .vdb files; others become boxes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from cycles_nodes import Images, Nodes
 
 
 def make_volume(volume: dict[str, Any], folder: Path, images: Images) -> Any:
-    """Make the data of a Blender object, which is placed by the volume's ``to_world``."""
+    """Make the data of a Blender object, whose transform is the volume's ``to_world``."""
     if volume.get("color") is not None or any(volume.get("emission", (0.0,))):
         raise NotImplementedError("volumes with emission or a colour grid")
     if volume.get("density") is None:

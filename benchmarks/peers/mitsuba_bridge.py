@@ -34,7 +34,7 @@ because each further pass has another seed and compiles its kernels again.
 """
 
 _FAR = 1e4
-"""Distance of the sphere that replaces a distant light, in sizes of the scene."""
+"""Distance of the sphere that replaces a distant light, as a multiple of the scene size."""
 
 
 def find_llvm() -> bool:
@@ -58,7 +58,7 @@ def find_llvm() -> bool:
 
 
 def load_mitsuba(variant: str | None = None, threads: int | None = None) -> ModuleType:
-    """Import Mitsuba in a variant; by default llvm_ad_rgb if it works, else scalar_rgb.
+    """Import Mitsuba in a variant, which is llvm_ad_rgb by default, or scalar_rgb without LLVM.
 
     Raises:
         ImportError: Mitsuba or the variant is missing.
@@ -91,10 +91,10 @@ class PeerSettings:
         width: Pixels.
         height: Pixels.
         max_depth: Scattering vertices, as Wavecomb counts them.
-        rr_depth: Vertices before roulette; by default there is none.
+        rr_depth: Path vertex at which Russian roulette starts; by default there is no roulette.
         instancing: Use shape groups where Mitsuba supports them; otherwise copy all instances.
         sampler: Name of a Mitsuba sampler.
-        integrator: Name of the integrator for volumes; or ptracer for light tracing.
+        integrator: Name of the integrator for scenes with volumes, or ptracer to trace light paths.
     """
 
     width: int
@@ -136,7 +136,7 @@ class MitsubaScene:
         self.scene = mi.load_dict(scene)
 
     def render(self, spp: int, seed: int = 0) -> NDArray[np.float32]:
-        """Render (height, width, 3); in several passes if all paths would not fit into memory."""
+        """Render an image (height, width, 3), in passes whose paths fit into memory."""
         pixels = self.settings.width * self.settings.height
         passes = -(-spp * pixels // MOST_PATHS)
         most = -(-spp // passes)
@@ -194,7 +194,7 @@ class MitsubaScene:
         return sensor
 
     def _transform(self, rows: Matrix) -> Any:
-        """Transform from a matrix for row vectors (translation in the last row)."""
+        """Convert a matrix for row vectors (translation in the last row) for Mitsuba."""
         return self.mi.ScalarTransform4f(np.ascontiguousarray(rows.T))
 
     # ---- lights ----------------------------------------------------------------------------------
@@ -236,7 +236,7 @@ class MitsubaScene:
         return {"type": "rgb", "value": [float(v) for v in colour]}
 
     def _lamp(self, shape: dict[str, Any], radiance: NDArray[Any]) -> dict[str, Any]:
-        """An emissive shape without reflection; Mitsuba's default BSDF would reflect a half."""
+        """Return an emissive shape that is black, since Mitsuba's default BSDF reflects a half."""
         shape["emitter"] = {"type": "area", "radiance": self._rgb(radiance)}
         shape["bsdf"] = {"type": "diffuse", "reflectance": self._rgb(np.zeros(3))}
         return shape
@@ -485,7 +485,7 @@ class MitsubaScene:
         return self._bitmap(use, np.clip(self._values(use), 0.0, 1.0))
 
     def _values(self, use: dict[str, Any]) -> NDArray[np.float32]:
-        """Texels of a texture use after channel selection, scale and bias: (h, w, 1 or 3)."""
+        """Texels (h, w, 1 or 3) of a texture after channel selection, scale and bias."""
         pixels = _linear(self.recorded.textures[use["texture"]])
         four = np.ones((*pixels.shape[:2], 4), np.float32)
         four[:, :, : pixels.shape[2]] = pixels
@@ -519,7 +519,7 @@ class MitsubaScene:
 
 
 def _linear(texture: dict[str, Any]) -> NDArray[np.float32]:
-    """Pixels of a recorded texture as linear float32."""
+    """Return the texels of a recorded texture as linear float32."""
     pixels = texture["pixels"]
     if pixels.dtype != np.uint8:
         return np.asarray(pixels, np.float32)

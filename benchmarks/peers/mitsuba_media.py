@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Convert recorded volumes to Mitsuba media, each in an invisible box.
 
-Mitsuba has no overlapping and no emissive media. Only the tests use colour grids.
+Mitsuba has no overlapping and no emissive media. Colour grids of volumes are not converted; only
+tests of Wavecomb use them.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ class Media:
         return self._mi.ScalarTransform4f(np.ascontiguousarray(rows.T))
 
     def _medium(self, volume: dict[str, Any]) -> tuple[Matrix, dict[str, Any]]:
-        """Transform of a volume's box from the unit cube to the world, and its medium."""
+        """Return the transform from the unit cube to a volume's box, and its medium."""
         extinction = np.asarray(volume["extinction"], np.float64)
         medium: dict[str, Any] = {
             "phase": {"type": "hg", "g": float(volume.get("anisotropy", 0.0))},

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Noise at equal samples: relMSE of each renderer against its converged image."""
+"""Measure the noise of renderers at equal samples: relMSE against converged images."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Picture = NDArray[np.float64]
 _BATCH = 256
 """Samples per pixel of one batch of a converged image; a square, as multijitter requires."""
 _REFERENCE = {"mitsuba": "mitsuba-llvm-multijitter", "cycles": "cycles-no-tree"}
-"""Renderer of each family's converged image; by default each renderer makes its own."""
+"""Renderer of the converged image of a family; other renderers make their own."""
 
 
 _OUTLIERS = 1e-3
@@ -44,7 +44,7 @@ class Noise:
         self.ours = ours
 
     def measure(self, name: str) -> dict[str, Any]:
-        """Measure the error of each seed minus that of the converged image, and the means.
+        """Measure the relMSE of each seed, minus the error of the converged image, and their mean.
 
         A few pixels with bright caustic paths make relMSE vary by chance. The trimmed error leaves
         out the worst 0.1 % of pixels and is divided by 1 + N / N_ref instead.
@@ -89,10 +89,10 @@ class Noise:
         return np.asarray(found, np.float64)
 
     def _converged(self, name: str) -> tuple[Picture, float]:
-        """Mean of batches with other seeds, and its relMSE estimated from their spread.
+        """Return the mean of batches with other seeds, and its relMSE, estimated from their spread.
 
-        E (x - r)^2 = var x + var r, so var r is subtracted. Where errors fall as 1 / N, subtracting
-        var r equals division by 1 + N / N_ref.
+        The expected (x - r)^2 of an image x and a reference r is var x + var r, so var r is
+        subtracted. Where errors fall as 1 / N, subtracting var r equals division by 1 + N / N_ref.
         """
         options = self.ours if name == "wavecomb" else {}
         batches = max(2, self.reference_spp // _BATCH)
@@ -111,7 +111,7 @@ class Noise:
 
 
 class _Lazy:
-    """A renderer's process that starts when an image or the renderer's version is needed."""
+    """Process of a renderer, started when an image or the renderer's version is first needed."""
 
     _versions: ClassVar[dict[str, str]] = {}
 
@@ -145,7 +145,7 @@ class _Lazy:
         return f"{self.job.stage.stem}-{self.name}-{number}"
 
     def picture(self, spp: int, seed: int) -> tuple[Picture, int]:
-        """Return an image and the samples per pixel that were taken."""
+        """Render an image; return it with the number of samples per pixel that it has."""
         file = self.cache / "picture.npy"
         answer = self._started().render(spp, seed, file)
         print(f"{self.name}: {spp} spp, {answer['seconds']:.1f} s", file=sys.stderr)

@@ -21,7 +21,7 @@ Matrix = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Curves:
-    """Arguments of ``SceneBuilder.add_curves`` that ``Mesh`` does not have."""
+    """Arguments of ``SceneBuilder.add_curves``, except those that are fields of ``Mesh``."""
 
     kind: str
     segments: NDArray[np.uint32]
@@ -53,7 +53,7 @@ class Mesh:
 
 @dataclass(frozen=True)
 class Placed:
-    """Instance of a mesh: mesh index, transform (row vectors), inherited material."""
+    """Instance of a mesh. The transform is for row vectors; `material` is inherited."""
 
     mesh: int
     transform: Matrix
@@ -62,7 +62,7 @@ class Placed:
 
 @dataclass
 class Group:
-    """Meshes and groups that are instanced together."""
+    """A group of meshes and of instances of other groups, which is instanced as a whole."""
 
     meshes: list[int] = field(default_factory=list)
     children: list[tuple[int, Matrix, NDArray[np.uint32] | None]] = field(default_factory=list)
@@ -82,7 +82,7 @@ class Recorded:
     bounds: Matrix = field(default_factory=lambda: np.zeros((2, 3)))
 
     def placed(self) -> list[Placed]:
-        """Return all visible meshes, with instances expanded."""
+        """Return an instance for each visible copy of a mesh; nested groups are expanded."""
 
         def expand(group: int, matrix: Matrix, inherited: int) -> Iterator[Placed]:
             for number in self.groups[group].meshes:
@@ -128,10 +128,10 @@ class Recorded:
 
 
 def dense(grid: dict[str, Any]) -> tuple[NDArray[np.float32], Matrix]:
-    """All voxels of a recorded grid, with a border of its background value.
+    """Return all voxels of a recorded grid, with a border of background voxels.
 
-    Returns values by x, y, z, and the transform (row vectors) to object space from the unit cube,
-    which the voxels divide into equal cells.
+    The array is indexed by x, y and z. Also returns the transform (for row vectors) from the unit
+    cube, which the voxels divide into equal cells, to object space.
     """
     origins, values = grid["origins"], grid["values"]
     edge = values.shape[1]

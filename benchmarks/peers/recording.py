@@ -20,16 +20,16 @@ from wavecomb.usd import load_stage
 
 @dataclass(frozen=True)
 class _Grid:
-    """A native grid and the arrays that it was made of."""
+    """A native voxel grid and the arrays that it was made from."""
 
     native: _core.VolumeGrid
     arrays: dict[str, Any]
 
 
 class RecordingBuilder(Recorded):
-    """Replaces ``_core.SceneBuilder``; ``scene`` is the native scene after ``build``.
+    """Records a scene in place of ``_core.SceneBuilder``. After ``build``, ``scene`` is native.
 
-    Calls that go directly to ``native``, the builder itself, are not recorded.
+    The native builder is ``native``; direct calls of its functions are not recorded.
     """
 
     def __init__(self) -> None:
@@ -48,7 +48,7 @@ class RecordingBuilder(Recorded):
         return self.native.add_material(program, **parameters)
 
     def add_graph(self, *arrays: Any) -> int:
-        """Add a value graph to the native scene only; peers use the material's constants."""
+        """Add a value graph to the native scene only; other renderers use constants."""
         return self.native.add_graph(*arrays)
 
     def add_mesh(
@@ -63,7 +63,7 @@ class RecordingBuilder(Recorded):
         name: str = "",
         **labels: Any,
     ) -> int:
-        """Record a mesh; only the native scene receives its labels for AOVs."""
+        """Record a mesh, and add it to the native scene, with labels for AOVs."""
         number = self.native.add_mesh(
             positions,
             indices,
@@ -115,7 +115,7 @@ class RecordingBuilder(Recorded):
         return number
 
     def make_surfaces(self, descriptions: list[dict[str, Any]], threads: int = 0) -> list[Any]:
-        """Refine subdivision surfaces; the results are added as meshes."""
+        """Refine subdivision surfaces; return arrays for ``add_mesh``, and record nothing."""
         return self.native.make_surfaces(descriptions, threads)
 
     def replace_mesh(self, mesh: int, *arrays: Any, **options: Any) -> None:
@@ -134,7 +134,7 @@ class RecordingBuilder(Recorded):
         return self.native.add_group(name, root)
 
     def add_to_group(self, group: int, mesh: int) -> None:
-        """Record a mesh in a group."""
+        """Record that a mesh belongs to a group."""
         self.groups[group].meshes.append(mesh)
         self.native.add_to_group(group, mesh)
 
@@ -146,7 +146,7 @@ class RecordingBuilder(Recorded):
         materials: NDArray[np.uint32] | None = None,
         **labels: Any,
     ) -> None:
-        """Record instances of a group; only the native scene receives their labels."""
+        """Record instances of group `child`; only the native scene receives their names."""
         self.groups[parent].children.append((child, np.asarray(transforms), materials))
         self.native.add_instances(parent, child, transforms, materials, **labels)
 
@@ -158,7 +158,7 @@ class RecordingBuilder(Recorded):
         return self.native.add_light(kind, transform, **options)
 
     def add_mesh_light(self, transform: NDArray[Any], material_sync: str, **options: Any) -> int:
-        """Add a mesh light to the native scene only; peers use only its material."""
+        """Add a mesh light to the native scene only; other renderers use the mesh's material."""
         return self.native.add_mesh_light(transform, material_sync, **options)
 
     def make_volume_grid(
@@ -170,7 +170,7 @@ class RecordingBuilder(Recorded):
         name: str = "",
         is_signed: bool = False,
     ) -> _Grid:
-        """Make a grid for ``add_volume``, which records it."""
+        """Make a voxel grid. It is recorded when ``add_volume`` is called with it."""
         native = _core.VolumeGrid(origins, values, index_to_object, background, name, is_signed)
         arrays = {"origins": origins, "values": values, "background": background,
                   "index_to_object": np.asarray(index_to_object, np.float64)}  # fmt: skip
@@ -189,7 +189,7 @@ class RecordingBuilder(Recorded):
         self.native.set_camera(transform, **options)
 
     def build(self) -> RecordingBuilder:
-        """Build the native scene; return this recording, which replaces it."""
+        """Build the native scene; return this recording in its place."""
         self.scene = self.native.build()
         self.bounds = np.array(self.scene.bounds, np.float64).reshape(2, 3)
         return self

@@ -22,9 +22,10 @@ class Renderer:
     Attributes:
         kind: Name of the renderer in worker.py.
         options: Options of the renderer.
-        spp: Samples of the short and of the long timed render. Slower renderers take fewer samples,
-            so that turns last equally long. Mitsuba's multijitter requires squares.
-        warm: Whether to render both sample counts before timing: Dr.Jit compiles for each count.
+        spp: Samples per pixel of the short and of the long timed render. Slower renderers take
+            fewer samples, so that all renders take about as long. Mitsuba's multijitter requires
+            squares.
+        warm: Whether to render both sample counts before timing, since Dr.Jit compiles for each.
     """
 
     kind: str
@@ -66,7 +67,7 @@ USUAL = tuple(name for name in RENDERERS if name not in _APART)
 
 @dataclass(frozen=True)
 class Job:
-    """Data shared by all renderers of a stage. ``digest`` is a hash of the recorded arrays."""
+    """Stage and arrays that all renderers use. ``digest`` is a hash of the recorded arrays."""
 
     stage: Path
     recorded: Path

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Results of a comparison: ratios with intervals, tables, and the machine."""
+"""Report the results of a comparison: ratios with intervals, tables, and the machine."""
 
 from __future__ import annotations
 

@@ -11,16 +11,16 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, UsdVol
 from wavecomb.scenes import write_scene
 
 VOLUMES = ("smoke-200", "smoke-500", "clouds-200", "clouds-500", "fog-cornell", "fog-room")
-"""Stages with volumes: smoke of 200 or 500 voxels per edge, without fire, and fog in rooms."""
+"""Stages with volumes: smoke grids of 200 or 500 voxels per edge, and fog in rooms."""
 
 BELOW = ("head", "candles")
 """Stages with subsurface scattering and hair."""
 
 _BROWN = (0.248, 0.435, 0.923)
-"""Hair absorption for melanin 0.52, the mean of scene head, a third of it pheomelanin (red)."""
+"""Hair absorption for melanin 0.52 (the mean in scene `head`), one third of it pheomelanin."""
 
 _FOG = {"cornell": 0.5, "room": 0.25}
-"""Optical thickness of each stage's fog along the size of the stage's bounds."""
+"""Optical thickness of the fog in each stage, over a distance of the stage's size."""
 
 
 def write_stage(name: str, path: Path, plain: bool) -> Path:
@@ -52,7 +52,7 @@ def write_stage(name: str, path: Path, plain: bool) -> Path:
 
 
 def _write_below(name: str, path: Path) -> Path:
-    """Hair of one colour, because peers do not support colours per strand."""
+    """Write a stage whose hair has one colour, since the other renderers have none per strand."""
     base = path.with_name(f"{path.stem}-base.usdc")
     write_scene(name, base, aspect=1.0)
     stage = Usd.Stage.Open(str(base))

@@ -84,7 +84,7 @@ def open_mitsuba(args: argparse.Namespace, options: dict[str, Any]) -> Opened:
 
 
 def open_cycles(args: argparse.Namespace, options: dict[str, Any]) -> Opened:
-    """Load the recorded arrays. Options: light_tree, pattern."""
+    """Load the recorded arrays in Cycles. Options are `light_tree` and `pattern`."""
     import bpy
     from cycles_bridge import CyclesScene, CyclesSettings
 
@@ -139,7 +139,7 @@ def main() -> None:
 
 
 def peak_mb() -> float:
-    """Peak memory of this program; getrusage would include the process that started it."""
+    """Return the peak memory of this process in MB; getrusage may include its parent process."""
     for line in Path("/proc/self/status").read_text(encoding="ascii").splitlines():
         if line.startswith("VmHWM:"):
             return int(line.split()[1]) / 1024

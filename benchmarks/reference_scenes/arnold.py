@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Convert the tests of Autodesk's arnold-usd to stages for Wavecomb.
 
-The USD file of a test is used unchanged, below a layer that replaces what only Arnold reads: the
-camera and light of the .ass file, and UsdShade equivalents of Arnold's shaders. The notes list
-everything that is translated.
+The USD file of a test is used unchanged. A layer over it adds the camera and the light of the .ass
+file, and UsdShade equivalents of Arnold's shaders. The notes list everything that is translated.
 """
 
 from __future__ import annotations
@@ -32,8 +31,9 @@ class Test:
 
     Attributes:
         stage: The file to render.
-        covered_only: Compare only pixels with alpha in the reference, whose dome is invisible.
-        space: Colour space of Arnold's render; the image is Rec.709.
+        covered_only: Compare only pixels with alpha in the reference, for tests with an invisible
+            dome.
+        space: Colour space that Arnold rendered in; the stored reference image is in Rec.709.
         notes: Description of the translation.
     """
 
@@ -132,7 +132,7 @@ class _Translator:
                 self._standard_surface(UsdGeom.Gprim(prim))
 
     def _standard_surface(self, gprim: UsdGeom.Gprim) -> None:
-        """Arnold's default shader, or that of the .ass file; MaterialX has the same model."""
+        """Make Arnold's default shader, or that of the .ass file, with MaterialX."""
         colours = gprim.GetDisplayColorAttr().Get()
         colour = colours[0] if colours else (0.8, 0.8, 0.8)
         inputs = {"base": 1.0, "base_color": colour}
@@ -157,7 +157,7 @@ class _Translator:
             self._note(f"{kind} becomes grey")
 
     def _flat(self, material: UsdShade.Material, shader: UsdShade.Shader) -> None:
-        """A flat shader shows the plain colour: translate it to emission."""
+        """Translate Arnold's flat shader, which shows a colour without lighting, to emission."""
         image = _source(shader, "inputs:color")
         kind, path = _kind(image), str(material.GetPath())
         uv, repeats = "st", 1.0
@@ -187,7 +187,7 @@ class _Translator:
         self._note(f"{_kind(shader)} of {kind} becomes emission by its image")
 
     def _coloured_instances(self, reader: UsdShade.Shader) -> None:
-        """Make user_data_rgb of point instancers the displayColor of unbound instances."""
+        """Use colours read by user_data_rgb as displayColor of instances without material."""
         name = str(reader.GetInput("attribute").Get())
         for prim in list(self.stage.Traverse()) + list(self.stage.TraverseAll()):
             primvar = UsdGeom.PrimvarsAPI(prim).GetPrimvar(name)
@@ -203,7 +203,7 @@ class _Translator:
         )
 
     def _mesh(self, mesh: UsdGeom.Mesh) -> None:
-        """Arnold treats meshes without a subdivisionScheme as polygons with smooth shading."""
+        """Convert meshes without a subdivisionScheme to smooth polygons, as Arnold does."""
         scheme = mesh.GetSubdivisionSchemeAttr()
         if scheme.HasAuthoredValue():
             return

@@ -5,8 +5,8 @@ Mitsuba's parser reads the file and its loaders the meshes; this module translat
 Exact equivalents: diffuse, smooth conductors by index, smooth dielectrics, plastic, GGX with little
 multiple scattering, all emitters except spots and projectors, and cameras. Approximations, listed
 in ``Film.notes``: Beckmann becomes GGX of the same alpha, plastic is linear, and emitters do not
-reflect. ``mitsuba_scene.referee`` applies the same changes to the Mitsuba scene, so that Mitsuba
-shows their effect on the image.
+reflect. ``mitsuba_scene.referee`` applies the same approximations to the Mitsuba scene, so that
+Mitsuba shows their effect on the image.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Film:
 
     Attributes:
         size: Width and height.
-        filter: Filter of Wavecomb.
+        filter: Name of the pixel filter for Wavecomb.
         filter_width: Pixels.
         max_depth: Scattering vertices, as Wavecomb counts them.
         left_out: Mask (height, width) of pixels that show objects which cannot be translated.
@@ -130,7 +130,7 @@ class _Translator:
         return to_world, (half, half * height / width), False
 
     def _left_out(self, sensor: int) -> NDArray[np.bool_]:
-        """Mask of pixels that may show dropped objects: their projected bounding boxes."""
+        """Return a mask of the projected bounding boxes of objects that are not translated."""
         width, height = self.film.size
         mask = np.zeros((height, width), bool)
         to_world, half, orthographic = self._view(sensor, self.film)
@@ -265,7 +265,7 @@ class _Translator:
         return self.out.material("diffuse", {"diffuseColor": (0.5, 0.5, 0.5)}), None
 
     def _material(self, number: int) -> tuple[str, Callable[[Any], Any] | None]:
-        """Return a material's path, and a function for mesh colours if the material needs them."""
+        """Return the material's path; and, if meshes need colours, the function that makes them."""
         scene, kind, props = self.scene, self.scene.kind(number), self.scene.props(number)
         if kind == "twosided":
             return self._material(next(scene.all_of(number, "BSDF")))
@@ -323,7 +323,7 @@ class _Translator:
         return eta.tolist(), k.tolist()
 
     def _brushed(self, eta: list[float], k: list[float], u: float, v: float) -> str:
-        """Add OpenPBR metal of alphas u and v that reflects like a metal of the complex index."""
+        """Add OpenPBR metal that looks like metal of a complex index; u and v are GGX alphas."""
         along, across = max(u, v), min(u, v)
         anisotropy = 1.0 - across / along
         roughness = math.sqrt(along / math.sqrt(2.0 / (1.0 + (1.0 - anisotropy) ** 2)))
@@ -370,7 +370,7 @@ class _Translator:
         return self.out.material("diffuse", {}, textures={"diffuseColor": use}), None
 
     def _blend(self, number: int) -> tuple[str, Callable[[Any], Any] | None]:
-        """A blend of two diffuse BSDFs by a mesh attribute: diffuse with the mean colour."""
+        """Convert a blend of two diffuse BSDFs by a mesh attribute to one with the mean colour."""
         parts = list(self.scene.all_of(number, "BSDF"))
         (texture,) = self.scene.all_of(number, "Texture")
         simple = all(self.scene.kind(p) == "diffuse" and not self.scene.children(p) for p in parts)

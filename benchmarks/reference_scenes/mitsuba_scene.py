@@ -12,10 +12,10 @@ import numpy as np
 
 
 class Scene:
-    """A parsed scene: nodes that refer to others by index."""
+    """A parsed scene, which consists of nodes that refer to each other by index."""
 
     def __init__(self, mi: Any, file: Path, width: int = 0) -> None:
-        """``width`` of the image, with unchanged aspect ratio; 0 means the scene's size."""
+        """Parse a file. ``width`` sets the image width at equal aspect ratio; 0 keeps the size."""
         self.mi = mi
         self.file = file
         self.config = mi.parser.ParserConfig(mi.variant())
@@ -35,7 +35,7 @@ class Scene:
         return str(self.state.nodes[number].props.plugin_name())
 
     def category(self, number: int) -> str:
-        """Category of a node: Shape, BSDF, Emitter and others."""
+        """Object type of a node in Mitsuba, such as Shape, BSDF or Emitter."""
         return str(self.state.nodes[number].type).rsplit(".", 1)[-1]
 
     def props(self, number: int) -> Any:
@@ -90,8 +90,8 @@ class Scene:
 def referee(scene: Scene, as_ours: bool) -> Any:
     """Load the scene in Mitsuba, without shapes whose files are missing.
 
-    ``as_ours`` applies the approximations of ``to_stage``. The parsed scene cannot be used
-    afterwards.
+    ``as_ours`` applies the approximations of ``to_stage``. Loading consumes the parsed scene, which
+    cannot be used afterwards.
     """
     root = scene.props(0)
     if not any(scene.category(n) == "Integrator" for n in scene.children(0).values()):

@@ -97,7 +97,7 @@ def write_dome(source: Path, file: Path) -> None:
 
 
 def write_magnified(source: Path, file: Path, edge: int = 256) -> None:
-    """Magnify a repeating sRGB image to ``edge`` texels by a uniform cubic B-spline; linear."""
+    """Magnify a repeating sRGB image to ``edge`` texels by a cubic B-spline; return it linear."""
     image = linear(read(source))
     for axis in (0, 1):
         count = image.shape[axis]

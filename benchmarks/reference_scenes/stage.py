@@ -77,7 +77,7 @@ class StageWriter:
         clip: tuple[float, float] = (1e-4, 1e6),
         orthographic: bool = False,
     ) -> None:
-        """Add a camera along -z with half extents ``half`` at distance 1, or in world units."""
+        """Add a camera along -z; ``half`` is the half extent of its view at distance 1."""
         camera = UsdGeom.Camera.Define(self.stage, "/camera")
         camera.CreateFocalLengthAttr(10.0)
         camera.CreateHorizontalApertureAttr(20.0 * half[0])
@@ -149,7 +149,7 @@ class StageWriter:
         uv: NDArray[Any] | None = None,
         colours: tuple[NDArray[Any], str] | None = None,
     ) -> None:
-        """Add world-space triangles or quads; uv with v up; colours with their interpolation."""
+        """Add a mesh of world-space triangles or quads; v of texture coordinates points up."""
         mesh = UsdGeom.Mesh.Define(self.stage, self._path("mesh"))
         counts = np.full(len(faces), faces.shape[1], np.int32)
         mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(_floats(points)))
@@ -193,10 +193,11 @@ class StageWriter:
         primvar: str = "",
         path: str = "",
     ) -> str:
-        """Add a UsdPreviewSurface with one of Wavecomb's programs; return its path.
+        """Add a UsdPreviewSurface that selects a shading program of Wavecomb; return its path.
 
-        ``own`` are Wavecomb's attributes, such as wavecomb:eta. ``primvar`` is the source of
-        diffuseColor. ``path`` names an existing material; by default a new material is made.
+        ``own`` has values of Wavecomb's own attributes, such as wavecomb:eta. ``primvar`` is the
+        source of diffuseColor. ``path`` names an existing material; by default a new material is
+        made.
         """
         path = path or self._path("material")
         material = UsdShade.Material.Define(self.stage, path)

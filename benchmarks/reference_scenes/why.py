@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reasons why images differ from their references, and scenes that are not compared.
 
-These explanations complement the notes of the translators. Each explanation says how it was
+These explanations complement the notes of the translators. Each explanation also states how it was
 verified.
 """
 

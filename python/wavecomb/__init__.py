@@ -13,7 +13,7 @@ import sys
 
 
 def _is_command() -> bool:
-    """Returns whether this program is the command ``wavecomb``, and not a user of the library.
+    """Returns whether this process runs the command ``wavecomb`` instead of a user's program.
 
     ``sys.argv`` is ``["-m", ...]`` while ``python -m`` imports a package, and a process of
     ``multiprocessing`` copies it from its parent.

@@ -17,7 +17,7 @@ class Error(ValueError):
     """Invalid input; the one-line message names the object and says what to do."""
 
 class VolumeGrid:
-    """Voxels in bricks of 8 x 8 x 8, with their transform.
+    """A sparse voxel grid: bricks of 8 x 8 x 8 voxels, and their transform.
 
     Args:
         origins: (n, 3) index of the first voxel of each brick; distinct multiples of 8.
@@ -27,7 +27,7 @@ class VolumeGrid:
         index_to_object: (4, 4) transform from indices to object space, for row vectors.
         background: Value outside of all bricks.
         name: Name for messages.
-        is_signed: Whether values may be negative, as velocities are.
+        is_signed: Whether values may be negative, which velocity grids need.
 
     Raises Error for values that are negative or not finite, for bricks that are duplicated or not
     at multiples of 8, and for grids with too many bricks.
@@ -93,18 +93,18 @@ class Scene:
         """
     @property
     def camera(self) -> dict[str, Any]:
-        """Camera as arguments of set_camera without motion; the transform is to_world (4, 4)."""
+        """Camera in the form of arguments of `set_camera`, with `to_world` (4, 4) as transform."""
     def material(self, material: int) -> dict[str, Any]:
-        """Returns name, program and parameters of a material in the form of add_material.
+        """Returns the name, program and parameters of a material as arguments of `add_material`.
 
-        Includes texture names, and as ``driven`` the parameters that the material's graph computes.
-        Raises Error if the id does not exist.
+        The result includes texture names. The entry ``driven`` lists the parameters that the
+        material's value graph computes. Raises Error if the id does not exist.
         """
     def light(self, light: int) -> dict[str, Any]:
-        """Returns name, kind, transform and parameters of a light in the form of add_light.
+        """Returns the name, kind, transform and parameters of a light as arguments of `add_light`.
 
-        The group is given by name; texture is the name of its texture, or None. Raises Error if the
-        index does not exist.
+        The entry `group` is the name of the light group, and `texture` the name of the light's
+        texture or None. Raises Error if the index does not exist.
         """
     @property
     def light_groups(self) -> list[str]:
@@ -265,8 +265,8 @@ class SceneBuilder:
         face_materials: (m,).
 
         attributes: name -> (rate, values (k, c) of 1 to 4 components), with the rates "constant" (k
-        = 1), "primitive" (m), "vertex" (n) and "corner" (3 m); for curves "end" (2 m) replaces the
-        last two.
+        = 1), "primitive" (m), "vertex" (n) and "corner" (3 m); curves have the rate "end" (2 m)
+        instead of "vertex" and "corner".
 
         C-ordered arrays of these types are not copied but kept alive; do not modify them
         afterwards. light_group: light group of its emission. asset_length: length of the asset's
@@ -287,7 +287,8 @@ class SceneBuilder:
 
         positions (n, 3) and indices (m, 3) contain one mesh after another, with the given numbers
         of points and triangles; indices are relative to the mesh's first point. groups: group of
-        each mesh, or 0xffffffff for none. Other arguments are as in add_mesh.
+        each mesh, or 0xffffffff for none. The arguments materials, asset_lengths and names have one
+        value for each mesh.
         """
     def replace_mesh(
         self,
@@ -301,7 +302,7 @@ class SceneBuilder:
         material: int = ...,
         attributes: Mapping[str, tuple[str, NDArray[np.float32]]] = ...,
     ) -> None:
-        """Replaces the arrays of a mesh, in the form of add_mesh.
+        """Replaces the arrays of a mesh; `add_mesh` describes their shapes.
 
         The name and groups of the mesh are unchanged.
         """
@@ -351,10 +352,11 @@ class SceneBuilder:
         n, 3) over the shutter, Bezier control points or points of lines. radii: (n,). normals:
         shape of positions, for ribbons.
 
-        segments: (m,) index of the first of four (lines: two) consecutive points, plus 2^31 if the
-        curve continues before the segment and 2^30 if it continues after it; the adjacent point
-        then gives the direction. uvs: (m, 2, 2) at both ends. face_materials: (m,). Arrays are kept
-        as in add_mesh.
+        segments: (m,) index of the first point of each segment, which has four consecutive points
+        (two for lines), plus 2^31 if the curve continues before the segment and 2^30 if it
+        continues after it; the adjacent point then gives the direction. uvs: (m, 2, 2) at both
+        ends. face_materials: (m,). The arrays are not copied but kept alive; do not modify them
+        afterwards.
         """
     def add_points(
         self,
@@ -372,7 +374,8 @@ class SceneBuilder:
         """Adds spheres and returns their id; they count as a mesh.
 
         positions: (n, 3), or (steps, n, 3) over the shutter. radii: (n,). uvs: (n, 2).
-        face_materials: (n,). Arrays are kept as in add_mesh.
+        face_materials: (n,). The arrays are not copied but kept alive; do not modify them
+        afterwards.
         """
     def add_splats(
         self,
@@ -392,14 +395,14 @@ class SceneBuilder:
         positions: centres (n, 3). scales: positive standard deviations along the axes (n, 3).
         orientations: quaternions w, x, y, z (n, 4). opacities: (n,) from 0 to 1. harmonics: real
         spherical harmonics (n, k, 3) of the colour minus 0.5, with k 1, 4, 9 or 16. material: of
-        program emissive, which multiplies the radiance. positions and harmonics are kept as in
-        add_mesh.
+        program emissive, which multiplies the radiance. positions and harmonics are not copied but
+        kept alive; do not modify them afterwards.
         """
     def add_group(self, name: str = "", root: str = "") -> int:
         """Adds an empty group; group 0, the world, always exists.
 
-        ``root`` is the prim path with which the names of its contents begin; names of instances
-        replace it.
+        ``root`` is a prim path with which names of the group's meshes begin. In each instance of
+        the group, the name of the instance replaces this path.
         """
     def add_to_group(self, group: int, mesh: int) -> None: ...
     def add_instances(
@@ -490,25 +493,25 @@ class SceneBuilder:
         visible: bool = True,
         # ---- to here ----
     ) -> int:
-        """Adds a light that emits from the triangles of the meshes that add_mesh gives it.
+        """Adds a mesh light and returns its id, which is the argument `mesh_light` of `add_mesh`.
 
         transform: from light space, in which shaping is relative to -z, to the mesh's group.
-        material_sync: materialGlowTintsLight, independent or noMaterialResponse; a mesh with the
-        last one needs an emissive material of radiance 1. visible: False if the mesh emits but is
-        invisible to rays; its material then has constant emission and opacity 0. Other parameters
-        are as in add_light.
+        material_sync: materialGlowTintsLight, independent or noMaterialResponse; with
+        noMaterialResponse the mesh needs an emissive material of radiance 1. visible: False if the
+        mesh emits but is invisible to rays; its material then has constant emission and opacity 0.
+        The remaining parameters have the same meaning as in `add_light`.
         """
     def add_geometry_set(self, rules: dict[str, str]) -> int:
         """Adds a set of prims for light linking and shadow linking.
 
-        ``rules`` are those of a UsdCollectionMembershipQuery: prim path -> exclude, explicit or
-        expand.
+        ``rules`` maps prim paths to "exclude", "explicit" or "expand", the rules of a
+        UsdCollectionMembershipQuery.
         """
     def add_visibility(self, path: str, rays: dict[str, bool]) -> None:
-        """Sets the ray visibility of a prim and of descendants without other settings.
+        """Sets the ray visibility of a prim and of those descendants that have no setting.
 
-        Keys: "camera", "shadow" and "bounces"; and "holdout", where camera rays end without
-        radiance.
+        The keys of ``rays`` are "camera", "shadow" and "bounces", for the rays that see the prim,
+        and "holdout", which ends camera rays at the prim without radiance.
         """
     def add_volume(
         self,
@@ -536,7 +539,8 @@ class SceneBuilder:
 
         ``velocity``: grid of signed vectors in object-space units per second. The value at p and
         time t is that of the grids at p - v(p) t; ``seconds`` are the opening and closing times of
-        the shutter. ``to_world``: (4, 4) for row vectors. Raises Error that names the volume.
+        the shutter. ``to_world``: (4, 4) for row vectors. Raises Error if an argument is invalid;
+        the message names the volume.
         """
     def add_ies(
         self, vertical: list[float], horizontal: list[float], candela: NDArray[np.float32]
@@ -564,8 +568,8 @@ class SceneBuilder:
         distance of 0 or less means that there is no such window. sides: four (a, b, c), each of
         which transmits smoothstep(a x + b y + c). The texture is read at u = dot(picture_u, p) and
         v = dot(picture_v, p) for p = (x, y, 1). decay: distances at which light starts to appear,
-        is complete, starts to fade, and vanishes. density: strength of the filter. next: another
-        filter. Raises Error.
+        is complete, starts to fade, and vanishes. density: strength of the filter. next: id of
+        another filter that acts on the same light, or None. Raises Error.
         """
     def set_camera(
         self,
@@ -631,8 +635,9 @@ class SceneBuilder:
     ) -> None:
         """Sets the camera, which looks along -z.
 
-        The renderer fits the window to the image as conform says. motion: (s, 4, 4) transforms at s
-        equal steps over the shutter. Raises Error for unknown names.
+        `conform` determines how the renderer fits the camera's window to the aspect ratio of the
+        image. motion: (s, 4, 4) transforms at s equal steps over the shutter. Raises Error for
+        unknown parameter names.
         """
     def build(self) -> Scene:
         """Validates the scene as a whole and builds it. Raises Error."""
@@ -792,7 +797,7 @@ class Result:
         """(height, width, 3), linear Rec.709."""
     @property
     def albedo(self) -> NDArray[np.float32] | None:
-        """(height, width, 3); like all AOVs, None if it was not requested."""
+        """Array (height, width, 3). It is None, as all AOVs are, if it was not requested."""
     @property
     def normal(self) -> NDArray[np.float32] | None:
         """(height, width, 3), world space."""
@@ -806,11 +811,12 @@ class Result:
     def deep(self) -> tuple[NDArray[np.uint32], NDArray[np.float32]] | None:
         """Sample counts (height, width), and R, G, B, A, Z, ZBack of all samples (n, 6).
 
-        Samples are in pixel order, the closest first. None unless the AOV deep was requested.
+        Samples are in pixel order, the closest first. The property is None unless the AOV `deep`
+        was requested.
         """
     @property
     def learned(self) -> bytes:
-        """Guiding field, for `learned` of another render of the scene; empty if there is none."""
+        """Guiding field for the argument `learned` of `render`; empty without path guiding."""
     @property
     def manifests(self) -> dict[str, dict[str, int]]:
         """Cryptomatte level -> name -> id of all objects in the image."""
@@ -820,7 +826,7 @@ class Result:
     def error(self) -> NDArray[np.float32] | None:
         """(height, width) error estimate of adaptive sampling; infinite if unknown.
 
-        None unless the render was adaptive or had the setting ``error``.
+        The property is None unless the render was adaptive or had the setting ``error``.
         """
     @property
     def variance(self) -> NDArray[np.float32] | None:
@@ -854,22 +860,22 @@ class Snapshot:
         run), and error (the last estimate of the mean relative error, or None).
         """
     def beauty(self) -> NDArray[np.float32]:
-        """Returns a copy (height, width, 3), linear."""
+        """Returns a copy of the image in linear colours, (height, width, 3)."""
     def samples(self) -> NDArray[np.uint32]:
-        """Returns a copy (height, width)."""
+        """Returns a copy of the sample counts of pixels, (height, width)."""
     def layer(self, name: str) -> NDArray[Any] | None:
-        """Returns a layer of Result or its aovs by name ("depth", "error" ...), computed now.
+        """Computes the current values of a layer of `Result`, such as "depth" or "error".
 
-        Returns None if the layer is not kept.
+        Returns None if the render does not keep this layer.
         """
     @property
     def stats(self) -> dict[str, Any]:
-        """Current values of Result.stats; error is the last estimate."""
+        """Current values of `Result.stats`; the entry `error` is the last estimate."""
     def state(self) -> dict[str, Any]:
-        """Returns the state from which render(state=...) continues.
+        """Returns the state of the render, with which `render(state=...)` continues it.
 
-        It contains numbers, and arrays of bytes that are not copied and valid only during
-        Watcher.snapshot().
+        The state contains numbers and byte arrays. The arrays are not copied, and are valid only
+        during `Watcher.snapshot()`.
         """
 
 def render(
@@ -890,15 +896,15 @@ def render(
     calling thread with the GIL held. Returning False cancels the render; the result then holds the
     finished samples. KeyboardInterrupt in the callback also stops the render.
 
-    policy: a wavecomb.SchedulingPolicy that replaces the policy of the settings; exceptions of its
-    order() are raised here. costs: initial profile in the form of Result.costs; a profile with all
-    materials and textures makes cost measurements unnecessary. recorder: records the rays of the
-    wavefront integrator.
+    policy: a wavecomb.SchedulingPolicy that replaces the policy of the settings; render() raises
+    exceptions of its method order(). costs: initial profile in the form of Result.costs; a profile
+    with all materials and textures makes cost measurements unnecessary. recorder: records the rays
+    of the wavefront integrator.
 
     watcher: a run.watcher.Watcher. Its progress(status) is called like progress and returns None,
     "snapshot" or "stop"; its snapshot(snapshot) receives requested snapshots and one at the end.
     state: state of a snapshot from a render with the same settings, from which this render
-    continues. learned: guiding field of another Result, which replaces training.
+    continues. learned: guiding field of another Result; with it, this render trains no field.
     """
 
 class Renderer:
@@ -912,13 +918,14 @@ class Renderer:
     """
 
     def __init__(self, scene: Scene, threads: int = 0) -> None:
-        """Builds acceleration structures. threads: number for building and edits; 0 means all.
+        """Builds acceleration structures. threads: number of threads for building and edits; 0
+        means all.
 
         Raises Error.
         """
     @property
     def scene(self) -> Scene:
-        """The edited scene: a new object after each edit, which shares unchanged data."""
+        """Current scene. Each edit makes a new object, which shares unchanged data with the old."""
     @property
     def version(self) -> int:
         """Number of edits."""
@@ -934,10 +941,11 @@ class Renderer:
 
         camera: arguments of set_camera, or a value of Scene.camera. materials: arguments of
         add_material by id, except program, name and textures. lights: arguments of add_light by
-        index, except kind, name, texture and group. moves: by prim path, transform (4, 4) in the
-        scene's space that all objects and lights at or below the prim have after their transform in
-        the first scene. Renders are then bit-identical to those of a scene that was built with
-        these values, where meshes of the world are instances once an object was moved.
+        index, except kind, name, texture and group. moves: maps prim paths to transforms (4, 4) in
+        world space, which are applied to all objects and lights at or below the prim after their
+        transforms in the first scene. A render after an edit is bit-identical to one of a scene
+        that was built with these values; once an object was moved, all meshes outside of groups
+        count as instances in that scene.
 
         A camera edit takes microseconds, and edits of materials and light colours take little time.
         If a mesh starts or stops being partially present, the groups that contain it are rebuilt.
@@ -982,19 +990,19 @@ class Renderer:
         for the shape of a light also light (index).
         """
     def learned(self, x: float, y: float, width: int, height: int) -> dict[str, Any] | None:
-        """Returns what the current or last render learned at the surface that ``pick`` returns.
+        """Returns data of path guiding and light selection at the surface that ``pick`` returns.
 
-        Returns None without a surface or before training. Keys: axis, the dominant axis of the
-        normal, "+x" ... "-z". density: density of guided bounces per steradian, (16, 16) float32,
-        rows of Clarberg's square (guiding/directions.h); None if the guiding field has no region
-        there. With a region also guided_share (the fraction of guided bounces) and survival (of the
-        trained roulette at throughput 1; 0 if unknown). light_shares: names of lights and emissive
-        meshes with their selection probabilities there, largest first, estimated from 4,096
-        selections.
+        The data are those of the current or last render. Returns None without a surface or before
+        training. Keys: axis, the dominant axis of the normal, "+x" ... "-z". density: density of
+        guided bounces per steradian, (16, 16) float32, rows of Clarberg's square
+        (guiding/directions.h); None if the guiding field has no region there. With a region also
+        guided_share (the fraction of guided bounces) and survival (of the trained roulette at
+        throughput 1; 0 if unknown). light_shares: names of lights and emissive meshes with their
+        selection probabilities there, largest first, estimated from 4,096 selections.
         """
 
 class RayRecording:
-    """Rays of one render, recorded to be traced again; for benchmarks/limit.py."""
+    """Recorder of the rays of a render, which `replay` traces again; for benchmarks/limit.py."""
 
     def __init__(self, scene: Scene, byte_limit: int = ...) -> None:
         """Raises Error for a scene with partially present surfaces.
@@ -1020,9 +1028,9 @@ class RayRecording:
     ) -> dict[str, Any]:
         """Traces all rays again in their order: with Embree alone, or as in a render.
 
-        width, coherent: options of camera, bounce and shadow rays; None uses those of the render.
-        Returns wall_s, and thread_s, rays and hits by kind of ray. Raises Error for a width that
-        Embree does not support here.
+        width, coherent: packet width and coherence flag of camera, bounce and shadow rays; None
+        uses those of the render. Returns wall_s, and thread_s, rays and hits by kind of ray. Raises
+        Error for a width that Embree does not support here.
         """
 
 """Names for Settings.aovs."""
@@ -1048,9 +1056,10 @@ def run_graph(
 ) -> NDArray[np.float32]:
     """Evaluates a value graph at points (n, 21); returns (n, outputs).
 
-    The 21 values are uv, its filter width, position, local position, normal, local normal, tangent
-    and view direction. Textures are white and attributes are missing. ``lanes`` is 1 or 16 and does
-    not change results. Raises Error for a graph that refers to missing objects.
+    The 21 values are the texture coordinates and their filter width, the position and normal in
+    world and local space, the tangent and the view direction. Textures are white and attributes are
+    missing. ``lanes`` is 1 or 16 and does not change results. Raises Error for a graph that refers
+    to missing objects.
     """
 
 def walk_albedo(color: float, anisotropy: float) -> float:
@@ -1070,7 +1079,8 @@ def peak_rss_bytes() -> int:
     """Returns the peak memory of this process in bytes."""
 
 def build_info() -> dict[str, str]:
-    """Returns version, compiler, library (its -march), isa (of its kernels) and tbb."""
+    """Returns the version, the compiler, the -march option of the library, the instruction set of
+    its kernels, and the version of TBB."""
 
 MAX_SUBDIVISION: int
 """Highest level of make_surfaces."""
@@ -1089,7 +1099,8 @@ def edge_pixels(
     """Returns the mean length in pixels of polygon edges, weighted by length.
 
     The result is the maximum over transforms (k, 4, 4) to the world. Edges outside of the image
-    count an eighth. to_camera: (4, 4) for row vectors. centre, half: of the camera's window.
+    have a weight of 1/8. to_camera: (4, 4) for row vectors. centre, half: centre and half extent of
+    the camera's window.
     """
 
 def split_quads(
@@ -1120,7 +1131,7 @@ def plain_mesh(
     ]
     | None
 ):
-    """Converts a mesh of only triangles or only quads; returns None for other and invalid meshes.
+    """Converts a mesh of triangles or of quads; returns None for mixed and invalid meshes.
 
     Returns the number of corners per face, 3 or 4; points (n, 3) transformed by a matrix (4, 4) for
     row vectors, None if it is the identity; their bounds (2, 3), all within the limit; and for
@@ -1142,7 +1153,7 @@ def plain_meshes(
     NDArray[np.float32],
     NDArray[np.uint8],
 ]:
-    """Converts g of k meshes as ``plain_mesh`` does, up to the first one that it refuses.
+    """Converts the first g of k meshes, up to the first that ``plain_mesh`` cannot convert.
 
     points, counts and indices hold one mesh after another; sizes (k, 3) are the numbers of points,
     faces and corners of each; matrices have the shape (k, 4, 4).
@@ -1171,10 +1182,10 @@ def used_points(triangles: NDArray[np.uint32], point_count: int) -> NDArray[np.b
 def clip_ears(corners: NDArray[np.float64], most_steps: int = ...) -> tuple[NDArray[np.int64], int]:
     """Splits a plane polygon (k, 2), counter-clockwise, into triangles (k - 2, 3) by clipping ears.
 
-    Also returns the number of corners that were cut without a check after the step limit.
+    Also returns the number of corners that were cut without a test after the step limit.
     """
 
 def weld_corners(
     corners: NDArray[np.int32], point_count: int, values: NDArray[np.float32]
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Merges corners of a point with equal values; returns indices (corners,) and the values."""
+    """Merges corners of a point that have equal values; returns corner indices and values."""

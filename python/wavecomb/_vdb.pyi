@@ -13,7 +13,7 @@ class TooLarge(ValueError):
     """A grid exceeds the memory limit."""
 
 def grids(path: str, heads: bool = False) -> list[dict[str, Any]]:
-    """Returns the name and type (as bytes), index and half-float flag of each grid.
+    """Returns the name and type (as bytes), the index and the half-float flag of each grid.
 
     Without ``heads``, also returns facts about the topology of each grid. Raises BrokenFile,
     OSError or MemoryError.

@@ -78,7 +78,7 @@ def load(
 
 
 def warn_deprecated(**given: object) -> None:
-    """Warns about deprecated arguments, which applied when a child process read stages."""
+    """Warns about deprecated arguments, which once configured a child process for loading."""
     import warnings
 
     for name in (name for name, value in given.items() if value is not None):
@@ -238,7 +238,7 @@ def _asked_for(
     settings: dict[str, Any],
     loading: Mapping[str, Any],
 ) -> tuple[tuple[int, int], Iterable[str] | None]:
-    """Returns size and AOVs, by default of the first render product; may set the region."""
+    """Returns the image size and AOVs, by default the first render product's; may set region."""
     names = ("render_settings", "product", "session_layer")
     asked = {name: loading[name] for name in names if loading.get(name) is not None}
     import_usd()
@@ -310,7 +310,8 @@ def _render(
 ) -> tuple[Result, bool]:
     """Renders a scene; also returns whether acceleration structures were built.
 
-    ``again`` is a loaded stage that keeps its renderer; ``named`` are arguments of the core.
+    ``again`` is a loaded stage that keeps its renderer. ``named`` are arguments of
+    ``_core.render``.
     """
     from wavecomb import _core
 

@@ -32,10 +32,10 @@ _OTHER_NAMES = {
     "stats": "statistics",
     "quiet": "silent",
 }
-"""Option -> names of other renderers and tools for it."""
+"""For each option, the names that other renderers and tools use for it."""
 
 SYNONYMS = {word: name for name, words in _OTHER_NAMES.items() for word in words.split()}
-"""Name of another renderer -> option of Wavecomb, with underscores in place of hyphens."""
+"""Maps names from other renderers to options of Wavecomb, with "_" for hyphens."""
 
 _KEYWORDS = {"aov": "aovs"}
 """Command-line options whose Python keyword has another name."""
@@ -47,7 +47,7 @@ _EXAMPLES = {
 
 
 _ELSEWHERE = ("width", "height", "spp", "policy", "costs", "size")
-"""Settings and load options that are not among the further keywords of ``render``."""
+"""Settings and load options that ``render`` declares as parameters and not as ``**options``."""
 
 
 def keywords() -> set[str]:

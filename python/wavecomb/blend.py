@@ -51,9 +51,9 @@ runpy.run_path(sys.argv[1], run_name="__main__")
 def command(script: str, *words: str) -> list[str]:
     """Returns the command that runs a script in Blender with scripts of files disabled.
 
-    The process is isolated as all processes of ``wavecomb.processes``. The program is
-    ``$WAVECOMB_BLENDER``, a Blender or a Python with bpy; else ``blender`` on PATH; else this
-    Python if it has bpy.
+    The process is isolated by ``wavecomb.processes``. The program is ``$WAVECOMB_BLENDER``, which
+    names Blender or a Python with the module bpy. Without this variable it is ``blender`` on PATH,
+    or else this Python if it has bpy.
 
     Args:
         script: Absolute path of the script.
@@ -86,8 +86,8 @@ def _run(words: Sequence[str], folder: str) -> subprocess.CompletedProcess[str]:
     """Runs Blender in a folder that contains no files of the user, and returns its output.
 
     Raises:
-        subprocess.TimeoutExpired: It took longer than ``LIMIT_S``.
-        OSError: It does not start.
+        subprocess.TimeoutExpired: Blender took longer than ``LIMIT_S``.
+        OSError: Blender could not be started.
     """
     variables = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
     child = processes.popen(

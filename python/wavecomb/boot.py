@@ -6,7 +6,7 @@ PYTHONPATH and puts neither the working folder nor a script's folder on ``sys.pa
 the given folders, closes inherited descriptors, creates a process group, makes the process end with
 its parent, and then runs the target, which is a module or ``-c CODE``.
 
-Contract: imports only the standard library, so that any Python can run it.
+This file imports only the standard library, so that any Python can run it.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ _PR_SET_PDEATHSIG = 1
 def end_with_parent(parent: int) -> None:
     """Makes the kernel kill this process when its parent ends (on Linux only).
 
-    More precisely, the kernel watches the parent's thread that started this process.
+    The kernel ends this process as soon as the thread of the parent that started it ends.
 
     Args:
         parent: Process that started this one. If the parent has already ended, this process ends as
-            well. 0 means the current parent, whichever it is.
+            well. 0 means the current parent, without this check.
     """
     if not sys.platform.startswith("linux"):
         return

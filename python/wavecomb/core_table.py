@@ -43,7 +43,7 @@ class MaterialParameter:
         kind: "number", "colour" or "flag".
         default: Default value, the same as in UsdPreviewSurface.
         program: The only program with this parameter; "" if all materials accept it.
-        least: Smallest value of the parameter; None means no limit.
+        least: Smallest valid value of the parameter; None means no limit.
         most: Largest number; None means no limit.
     """
 
@@ -161,12 +161,12 @@ class LightParameter:
         input: UsdLux name without "inputs:"; "" if UsdLux has no equivalent.
         group: "emission", "shape", "shaping" or "response".
         kind: "number", "colour", "flag", "choice", "id" or "transforms".
-        refers: Kind of object that an id refers to: "texture", "profile", "set", or "group", which
-            is a name.
+        refers: Kind of object that the parameter refers to by id ("texture", "profile", "set") or
+            by name ("group").
         default: Default value; None for ids.
         least: Smallest number; None means no limit.
         most: Largest number; None means no limit.
-        usual: Upper end of a slider if there is no largest number.
+        usual: Upper end of the slider in the window, for parameters without a largest number.
         choices: Allowed values of a parameter of kind "choice".
         kinds: Kinds of light that have the parameter.
     """

@@ -25,8 +25,8 @@ class Check:
         name: Name of the checked part for users.
         state: "ok", "missing" or "broken".
         text: A version or an error, one line.
-        needed: Whether renders need it.
-        do: Command or instruction that fixes the problem; "" for a part that works.
+        needed: Whether rendering needs this part.
+        do: Command or instruction that fixes the problem; "" if there is no problem.
     """
 
     name: str
@@ -187,7 +187,7 @@ def _materialx_version() -> str:
 
 
 def _embree_version() -> str:
-    """Queries the Embree library that the native library has loaded."""
+    """Returns the version of the Embree library that the native core has loaded."""
     import ctypes
 
     from wavecomb import _core  # noqa: F401
@@ -246,7 +246,7 @@ def _extra(name: str) -> Check:
 
 
 def _display() -> Check:
-    """Starts Qt on the display."""
+    """Checks that Qt can start on the display."""
     from wavecomb.gui.needs import NO_DISPLAY, has_display, start_qt
 
     if not has_display():

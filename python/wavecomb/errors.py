@@ -7,7 +7,7 @@ from typing import Any
 
 
 class Error(Exception):
-    """Base class of all errors that Wavecomb raises on purpose, also of those of its core.
+    """Base class of all errors that Wavecomb and its native core raise on purpose.
 
     >>> try:  # doctest: +SKIP
     ...     wavecomb.render("shot.usd", spp=0)

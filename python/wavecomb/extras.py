@@ -39,7 +39,7 @@ EXTRAS = {
         ("flip_evaluator", "jinja2", "matplotlib", "pandas", "scipy"),
     ),
 }
-"""Extras by name, without those for developers of Wavecomb."""
+"""Extras for users by name; extras for developers are not included."""
 
 
 def install_command(extra: str) -> str:
@@ -69,7 +69,7 @@ def requirements(extra: str) -> list[str]:
 
 
 def _is_for_this_python(marker: str) -> bool:
-    """Returns whether the python_version bounds of a marker hold."""
+    """Returns whether this Python satisfies the python_version bounds of a package marker."""
     bounds = re.findall(r"""python_version (<|>=) ['"](\d+)\.(\d+)['"]""", marker)
     now = sys.version_info[:2]
     return all((now < (int(a), int(b))) == (sign == "<") for sign, a, b in bounds)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Jobs for each kind of run: timed, converged, recording of costs, and other renderers."""
+"""Builds the jobs of a suite: timed runs, converged images, cost measurements, and others."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from wavecomb.run.cost_profile import save_costs
 
 
 def stage_file(source: StageSource, name: str, folder: Path) -> Path:
-    """Returns the file of the stage, which may not be generated yet."""
+    """Returns the file of a stage. A generated stage may not have been written yet."""
     if source.file is not None:
         return source.file
     return folder / f"{name}-{digest([source.scene, source.options])}.usdc"
@@ -66,7 +66,7 @@ Job = dict[str, Any]
 
 
 class Jobs:
-    """Builder of the jobs of a sitting, that is, of one execution of a suite."""
+    """Builder of the jobs for one execution of a suite."""
 
     def __init__(self, suite: Suite, folder: ResultFolder, cpus: list[int]) -> None:
         self._suite = suite
@@ -133,10 +133,10 @@ class Jobs:
         return self._job(config, settings, image=str(self.golden(config)))
 
     def recording(self, config: Config, number: int, ranks: Path | None = None) -> Job:
-        """Returns a render from which shading costs are measured.
+        """Returns a job whose render measures the shading costs of materials.
 
-        The render's shading records are sorted by material, so that each batch holds one material.
-        ``ranks`` is an optional cost file that determines the order of materials.
+        The render sorts hits by material, so that each batch of hits has one material. ``ranks`` is
+        an optional cost file that determines the order of materials.
         """
         settings = {**config.settings, "policy": "material", "roulette": "throughput"}
         settings |= {"seed": self._suite.golden.seed + 1 + number}
@@ -240,7 +240,7 @@ def check_peers(renderers: set[str]) -> None:
 
 
 def record(stage: Path) -> Path:
-    """Exports the arrays of a stage for the peers, once, to a folder beside the stage."""
+    """Writes the arrays of a stage for other renderers to a folder beside the stage, once."""
     folder = stage.with_name(f"{stage.stem}-recorded")
     if folder.is_dir() and any(folder.iterdir()):
         return folder
@@ -263,7 +263,7 @@ def record(stage: Path) -> Path:
 def run_peer(
     config: Config, stage: Path, spp: int, seed: int, image: Path, threads: int
 ) -> Outcome:
-    """Renders with a peer in a fresh process and writes the image to ``image``."""
+    """Renders with another renderer in a new process and writes its result to ``image``."""
     width, height = config.settings["size"]
     if width != height:
         raise WavecombError(f"{config.name}: peers render square images only; change its size")

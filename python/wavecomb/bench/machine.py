@@ -27,7 +27,7 @@ _SYS_CPU = Path("/sys/devices/system/cpu")
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of a machine, for values of a suite that depend on them.
+    """Properties of a machine that limit the values of settings in a suite.
 
     Attributes:
         threads: Number of usable cores.
@@ -200,13 +200,13 @@ def _read(path: Path) -> str:
 MAX_OTHERS = 0.05
 """Largest fraction of all cores' time that other processes may take during a run."""
 MAX_SPIN = 1.10
-"""Largest time of the spin, a fixed CPU workload, relative to its time on the quiet machine."""
+"""Largest time of the spin, a fixed CPU workload, relative to its time on the idle machine."""
 MAX_NOISY_RUNS = 0.2
 MAX_VARIATION = 0.10
 
 
 def spin_reference(spins: Sequence[float]) -> float:
-    """Returns the time that the spin, a fixed CPU workload, takes on the quiet machine.
+    """Returns the time that the spin, a fixed CPU workload, takes on the idle machine.
 
     The time is estimated by the lower quartile of all measurements, since noise only adds time.
     """
@@ -256,7 +256,7 @@ class Noise:
 
 
 def judge(rows: Iterable[Mapping[str, Any]]) -> Noise:
-    """Judges successful runs from rows with "config", "status", "render_s" and "noisy"."""
+    """Computes the noise of successful runs, given the rows of all runs in runs.csv."""
     good = [row for row in rows if row["status"] == "ok"]
     disturbed = sum(bool(row["noisy"]) for row in good)
     times: dict[str, list[float]] = defaultdict(list)

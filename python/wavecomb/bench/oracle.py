@@ -5,12 +5,12 @@
 ``oracle-best``   the order of material runs that is fastest according to the recordings.
 ``oracle-worst``  the order of material runs that is slowest according to the recordings.
 
-``oracle-best`` and ``oracle-worst`` use the policy ``material`` with ranks in place of costs. This
-policy shades the materials of a program in ascending cost, so a cost file with ranks can produce
-any order. The cost of a record depends on the material shaded just before, and the order of runs
-changes nothing but the preceding material. The trace therefore
-holds recordings of the same render under different orders of materials, and the best order is the
-path through the materials of a program with the smallest expected cost.
+The oracles ``oracle-best`` and ``oracle-worst`` use the policy ``material`` with ranks in place of
+costs. This policy shades the materials of a program in ascending cost, so a cost file with ranks
+can produce any order. The cost of shading a hit depends on the material that was shaded just
+before, and an order of materials changes only this preceding material. The costs are therefore
+recorded in several renders with different orders of materials. The best order is the path through
+the materials of a program with the smallest expected cost.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ def shuffled(names: Sequence[str], number: int) -> list[str]:
 
 
 def recorded(order: Sequence[str], answer: Mapping[str, Any]) -> Recording:
-    """Returns a recording of the trace: the order of materials and their measured costs."""
+    """Returns the order of materials in a recording render, and their measured costs."""
     stats = answer["stats"]
     materials = {
         entry["name"]: {
@@ -114,15 +114,16 @@ def best_orders(trace: Sequence[Recording]) -> dict[str, Any]:
 
     For materials a, b of one program, cost(b after a) is the mean of b's measured ns per record
     over the recordings in which b's run came directly after a's, and of one more value: b's mean
-    over all recordings. The additional value damps pairs that were measured only once. Each
-    recording is scaled by its traversal time per ray, which removes drift of the machine. An order
-    takes the following time:
+    over all recordings. The additional value reduces the effect of pairs that were measured only
+    once. Each recording is scaled by its traversal time per ray, which removes drift of the
+    machine. An order takes the following time:
 
         sum over b of records(b) * cost(b after its predecessor)
 
     Returns:
-        ``best``, ``worst``: all names in order; ``best_ns``, ``worst_ns``, ``mean_ns``: expected ns
-            of all records, where ``mean_ns`` is the mean over the orders of the trace.
+        The entries ``best`` and ``worst`` are the names of all materials in order. The entries
+            ``best_ns``, ``worst_ns`` and ``mean_ns`` are expected nanoseconds for shading all hits,
+            and ``mean_ns`` is the mean over the recorded orders.
     """
     scale = _scales(trace)
     names = sorted({name for recording in trace for name in recording["materials"]})
@@ -164,7 +165,7 @@ def _costs(
 ) -> tuple[dict[str, float], dict[tuple[str, str], float]]:
     """Returns the mean ns per record of each material, and after each predecessor.
 
-    The predecessor "" stands for the start of a program.
+    The predecessor "" means that the material comes first in its program.
     """
     every: dict[str, list[float]] = {}
     pairs: dict[tuple[str, str], list[float]] = {}

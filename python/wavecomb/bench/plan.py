@@ -34,7 +34,7 @@ class Config:
     Attributes:
         name: Short name, unique in the suite and usable in file names.
         experiment: Name of the experiment.
-        renderer: "wavecomb" or a peer.
+        renderer: "wavecomb" or the name of another renderer.
         stage: Name of the stage, with its varied options.
         source: Source of the stage.
         settings: Settings of the render; the policy may be an oracle.
@@ -100,13 +100,13 @@ def digest(value: Any) -> str:
 
 
 def configurations(suite: Suite, limits: Limits, threads: int | None = None) -> list[Config]:
-    """Lists all configurations, in the order of the file, without values that this machine lacks.
+    """Lists all configurations that this machine supports, in the order of the file.
 
     Args:
         suite: The suite.
         limits: Limits of the machine.
-        threads: Number of threads of all runs that do not vary it; None means the number in the
-            suite.
+        threads: Number of threads of runs that do not vary the thread count; None means the number
+            in the suite.
     """
     found: list[Config] = []
     for experiment in suite.experiments:
@@ -213,7 +213,7 @@ def _safe(text: str) -> str:
 
 
 def _resolved(path: Path, key: str, values: Sequence[Any], limits: Limits) -> list[Any]:
-    """Returns the values that this machine supports, without duplicates or excess threads."""
+    """Returns the values that this machine supports, each once; skips excess thread counts."""
     found: list[Any] = []
     for value in values:
         number = _resolve(path, key, value, limits)
@@ -256,7 +256,7 @@ def _cache_mb(path: Path, text: str, limits: Limits) -> float:
 _SIZE = 160
 _SPP = 8
 _BYTES_PER_SECOND = 25e6
-"""Assumed speed of reading and tiling textures during loading, in bytes per second."""
+"""Assumed rate at which loading reads and tiles textures, in bytes per second."""
 _TRIANGLES_PER_SECOND = 1.5e6
 """Assumed speed of reading meshes and building the BVH, in triangles per second."""
 
@@ -307,7 +307,7 @@ class Estimator:
 
 
 def _load_s(config: Config) -> float:
-    """Estimates how many seconds a generated stage takes to load, minus those of a small stage."""
+    """Estimates by how many seconds loading a stage takes longer than loading a small stage."""
     if not config.source.scene:
         return 0.0
     from wavecomb.scenes import SceneOptions
@@ -323,7 +323,7 @@ def _load_s(config: Config) -> float:
 
 
 def calibrate(configs: Sequence[Config], cpus: Sequence[int]) -> Estimator:
-    """Measures a small stage with each number of lanes in the plan, which takes seconds."""
+    """Measures renders of a small stage with each lane count in the plan; takes seconds."""
     from wavecomb.bench.process import run_worker
     from wavecomb.scenes import write_scene
 

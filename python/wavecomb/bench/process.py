@@ -27,7 +27,7 @@ EVENTS = {
     "llc_misses": ("LLC-load-misses", "cache-misses"),
     "branch_misses": ("branch-misses",),
 }
-"""Names of perf events for each column, in order of preference, because CPUs differ."""
+"""Names of perf events for each column, in order of preference; CPUs support some of them."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class Session:
     """Runs one worker under perf, which counts only while the worker has enabled it.
 
     ``command`` is the prefix of the worker's command, and ``fds`` are file descriptors to pass to
-    the worker. ``job`` becomes the entry ``perf`` of the job that the worker reads.
+    the worker. The value of ``job`` is passed to the worker as the entry ``perf`` of its job.
     """
 
     def __init__(self, events: dict[str, str], report: Path) -> None:
@@ -182,7 +182,7 @@ def run_worker(job: dict[str, Any], events: dict[str, str], scratch: Path) -> Ou
 def run_process(
     command: Sequence[str], job: dict[str, Any], *, fds: tuple[int, ...] = ()
 ) -> Outcome:
-    """Runs a command that reads a JSON job, and takes its last line on stdout as JSON answer."""
+    """Runs a command with a job as JSON input, and reads its answer from its last JSON line."""
     done = run_lines(command, json.dumps(job), fds=fds)
     outcome = done.outcome
     answer = done.lines[-1] if done.lines else None
@@ -193,7 +193,7 @@ def run_process(
 
 @dataclass
 class Lines:
-    """JSON objects that a process printed, and an outcome to report if the process failed."""
+    """Output of a process: JSON objects that it printed, and its outcome with any failure."""
 
     lines: list[Any]
     outcome: Outcome

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The result folder, written so that a kill at any moment loses at most one run.
+"""The result folder of a suite. A kill at any moment loses at most one run.
 
 ``runs.jsonl`` is authoritative: each object is appended and flushed to disk before the row in
 ``runs.csv``. Resuming a folder cuts off an incomplete last line and rebuilds ``runs.csv``.
-``runs.jsonl`` holds all data that a row leaves out, by ``run_id`` (docs/bench.md). In ``runs.csv``
-an empty cell means "not measured" or "does not apply", never 0.
+``runs.jsonl`` also holds all data without a column in ``runs.csv``, by ``run_id`` (docs/bench.md).
+In ``runs.csv`` an empty cell means "not measured" or "does not apply", never 0.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ PHASE_COLUMNS = (
     *("generate_s", "order_rays_s", "trace_s", "collect_s", "keys_s", "sort_s", "materialize_s"),
     *("shade_s", "shadow_s", "resolve_s", "metrics_s", "other_s"),
 )
-"""Columns of mutually exclusive phases. Phases together with ``other_s`` add up to threads x
-render_s."""
+"""Columns of phase times in thread seconds. Phases do not overlap, and together with ``other_s``
+they add up to threads x render_s."""
 
 COUNTER_COLUMNS = (
     *("cycles", "instructions", "l1d_misses", "l2_misses", "llc_misses", "branch_misses"),

@@ -47,7 +47,7 @@ class Options:
     Attributes:
         repetitions: Overrides the suite's repetitions.
         only: Pattern for names of configurations.
-        threads: Overrides the suite's threads in runs that do not vary them.
+        threads: Overrides the suite's thread count in runs that do not vary the thread count.
         seed: Overrides the suite's seed of the order of runs.
         time_limit_s: Starts no run that would end after this time, in seconds.
         resume: Whether to continue with the results in the folder.
@@ -67,9 +67,11 @@ class Options:
 class Sitting:
     """One call of ``wavecomb bench run``.
 
-    ``event`` receives the messages of ``say`` as values for programs; docs/bench.md lists them.
+    ``say`` receives messages for users, and ``event`` receives the same messages as named values
+    for programs (docs/bench.md).
 
-    ``run`` may be stopped at any moment, also by a signal. Finished runs are kept.
+    The method ``run`` may be stopped at any moment, for example by a signal. The results of
+    finished runs are kept.
     """
 
     suite: Suite
@@ -97,7 +99,7 @@ class Sitting:
         self.jobs = Jobs(self.suite, self.folder, self.cpus)
 
     def estimator(self) -> Estimator:
-        """Returns an estimator of run times, from the folder's results or else a calibration."""
+        """Returns an estimator of run times, from results in the folder or else a calibration."""
         by_name = {config.name: config for config in self.configs}
         known = from_results(self.folder.objects, by_name)
         return known or calibrate(self.configs, self.cpus)
@@ -178,7 +180,7 @@ class Sitting:
         self._keep_machine()
 
     def _prepare(self, left: Sequence[Run]) -> None:
-        """Prepares stages, converged images and true costs, then warms up."""
+        """Prepares stages, converged images and true costs, then executes the warm-up runs."""
         configs = list({run.config.name: run.config for run in left}.values())
         stages = {self.jobs.stage(config): config for config in configs}
         for path, config in stages.items():

@@ -63,7 +63,7 @@ class Table:
         return value
 
     def choice(self, key: str, default: str, allowed: tuple[str, ...]) -> str:
-        """Takes the value of a key that must be one of several words."""
+        """Takes the value of a key, which must be one of the given words."""
         value = str(self.take(key, str, default))
         if value not in allowed:
             raise self.error(key, f"must be one of {', '.join(allowed)}, not {value!r}")
@@ -108,7 +108,7 @@ _NOT_OF_SUITES = ("width", "height", "seed", "adaptive", "noise", "min_spp", "er
 def suite_settings() -> dict[str, str]:
     """Returns the settings that a suite may choose, with their kinds.
 
-    A count is an integer, "all" or "widest".
+    The kind "count" means an integer, "all" or "widest".
     """
     kinds = {"choice": "text", "text": "text", "flag": "flag", "number": "number"}
     own = {name: row for name, row in settings().items() if name not in _NOT_OF_SUITES}

@@ -42,12 +42,14 @@ class Experiment:
         stages: Names of stages.
         renderers: Names from ``RENDERERS``.
         settings: Settings that all runs share.
-        vary: Values by setting; all combinations are run.
-        stage_vary: Values by option of the stage; all combinations are run.
-        cases: Settings that change together; each is combined with all of ``vary``.
+        vary: For each setting, the values to run; all combinations are run.
+        stage_vary: For each option of generated stages, its values; all combinations are run.
+        cases: Cases: settings that change together. Each case is combined with all values of
+            ``vary``.
         case_names: Name of each case, or "" for a case without a name. Named cases are compared
             with the case named "off".
-        skip: Combinations to leave out: those that agree with all keys of one entry.
+        skip: Combinations that are not run: a combination is left out if it has all values of an
+            entry.
         factor: Key of ``vary`` or ``stage_vary`` over which a scaling curve is drawn, or "".
         images: Repetitions that keep their image: "none", "first" or "all".
         golden: Whether images are compared with a converged image.
@@ -112,7 +114,7 @@ STAGE_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
 
 
 def with_folder(suite: Suite, folder: Path) -> Suite:
-    """Adds the stages of a folder to each experiment that does not vary options of stages.
+    """Adds the stages of a folder to each experiment without varied stage options.
 
     Raises:
         WavecombError: The folder has no stages, or two stages have the same name.
@@ -137,7 +139,7 @@ def with_folder(suite: Suite, folder: Path) -> Suite:
 
 
 def naming_folder(suite: Suite, folder: Path) -> Suite:
-    """Applies ``with_folder``, and records the folder in the suite's text for later reference."""
+    """Adds the stages of a folder to a suite, and adds the folder's path to the suite's text."""
     more = with_folder(suite, folder)
     # Write the path as a JSON string, which is also a valid basic string of TOML.
     key = f"stages_folder = {json.dumps(folder.resolve().as_posix(), ensure_ascii=False)}\n"

@@ -47,7 +47,7 @@ def main() -> None:
 
 
 def run(job: Job) -> dict[str, Any]:
-    """Loads the stage, warms up, renders and compares the image."""
+    """Loads the stage, renders it once without measurement, then renders and compares the image."""
     from wavecomb import api
     from wavecomb.bench.process import Switch
     from wavecomb.run.cost_profile import load_costs
@@ -86,10 +86,11 @@ def _mean_spp(stats: Mapping[str, Any]) -> float:
 def judge_picture(beauty: Any, spp: float, golden: dict[str, Any] | None) -> dict[str, Any]:
     """Returns a hash of the image, and its error against the golden (converged) image.
 
-    The variance of the golden image is that of one sample divided by the golden spp. The variance
-    of the golden image increases the measured squared error by the factor 1 + spp / golden spp, so
-    the error is divided by this factor. The correction is too small if guiding made the samples
-    less noisy than those of the golden image, which is rendered without guiding.
+    The variance of the golden image is the variance of one sample divided by its number of samples
+    per pixel (golden spp). The variance of the golden image increases the measured squared error by
+    the factor 1 + spp / golden spp, so the error is divided by this factor. The correction is too
+    small if guiding made the samples less noisy than those of the golden image, which is rendered
+    without guiding.
     """
     import hashlib
 

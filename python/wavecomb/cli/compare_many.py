@@ -27,7 +27,7 @@ def compare_many(
         True if all pairs pass and no image lacks a counterpart.
 
     Raises:
-        WavecombError: There is nothing to compare.
+        WavecombError: There are no images to compare.
     """
     folders = pair_up(a, b)
     results: list[PairResult] = []

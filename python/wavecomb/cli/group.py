@@ -118,7 +118,7 @@ class Commands(click.Group):
 
 
 def _output_of(words: Sequence[str]) -> str:
-    """Returns "result" if a command prints its result on standard output, else "messages"."""
+    """Returns what a command prints on standard output: "result" or "messages"."""
     names = [word for word in words if not word.startswith("-")]
     return "messages" if _WRITES_FILES & {tuple(names[:1]), tuple(names[:2])} else "result"
 
@@ -176,7 +176,7 @@ def options_of(context: click.Context) -> list[str]:
 
 
 def suggestions(name: str, options: list[str]) -> list[str]:
-    """Returns at most three options that a misspelt one may stand for, the most likely first.
+    """Returns up to three options that are similar to a misspelt option, most likely first.
 
     >>> suggestions("--smaples", ["--spp", "--size", "--shutter"])
     ['--spp']

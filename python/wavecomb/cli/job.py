@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 class Still:
-    """A stage at one frame, as the source of one image."""
+    """Source of one image: loads a stage at one frame and renders it."""
 
     def __init__(self, job: Job, kept: Any = None) -> None:
         """Creates the source; ``kept`` is an object to keep alive until the stage is loaded."""
@@ -67,7 +67,7 @@ class Still:
         return _core.render(self._loaded.scene, *arguments, **named)
 
     def render_part(self, settings: Any, *arguments: Any, **named: Any) -> Any:
-        """Renders a band of the image, and keeps the renderer for the next one."""
+        """Renders a band of the image, and keeps the renderer for the next band."""
         from wavecomb import _core
 
         assert self._loaded is not None
@@ -76,7 +76,7 @@ class Still:
         return self._renderer.render(settings, *arguments, **named)
 
     def stats(self, result: Any, resumed_s: float) -> dict[str, Any]:
-        """Returns the statistics of a result that continues a render of ``resumed_s`` seconds."""
+        """Returns the statistics; a resumed render had taken ``resumed_s`` seconds before."""
         stage = self._job.options.stage
         return make_stats(result, stage=stage, loaded=self._loaded, resumed_s=resumed_s)
 
@@ -94,7 +94,7 @@ class FrameShot:
     def load(
         self, progress: Callable[[int, int], None] | None = None, **changes: Any
     ) -> LoadedStage:
-        """Loads what changed since the previous frame."""
+        """Loads the parts of the stage that changed since the previous frame."""
         return self._frames.load(self._frame, progress=progress, **self._options, **changes)
 
     def stats(self, result: Any, resumed_s: float) -> dict[str, Any]:
@@ -116,7 +116,7 @@ class Job:
         aovs: AOVs of the image.
         loading: Arguments of ``wavecomb.load``.
         profile: Initial scheduling costs, or None.
-        learning: Initial guiding data, which all jobs of a command share.
+        learning: Initial path guiding data, which all jobs of a command share.
         reporter: Progress display.
     """
 
@@ -204,7 +204,7 @@ class Job:
     def _run_bands(self, shot: Shot, loaded: LoadedStage, rows: int, keeps_stopped: bool) -> Done:
         """Renders an image in bands and writes each one.
 
-        After a stop, the remaining bands of the image are written empty.
+        If the render is stopped, the remaining bands are written without samples.
         """
         options = self.options
         settings, height = self.settings.to_dict(), image_size(self.settings)[1]
@@ -274,7 +274,8 @@ class Job:
         """Prepares checkpoints and previews.
 
         Returns:
-            The sinks that save both, the state to resume or None, and the seconds rendered so far.
+            Sinks that save checkpoints and previews; the state to resume, or None; and the seconds
+        rendered so far.
         """
         options = self.options
         sinks: list[Sink] = []
@@ -302,7 +303,7 @@ class Job:
         return sinks, state, seconds
 
     def write(self, done: Done) -> tuple[Done, list[str]]:
-        """Writes an image's files, unless it was written in bands; returns image and names."""
+        """Writes the image unless its bands were written already; returns image and files."""
         if done.picture is None:
             return done, list(done.files)
         options, picture = self.options, done.picture
@@ -330,7 +331,7 @@ class Job:
 
 
 class _NotKept(Exception):
-    """Stopped render of an image in bands that is not to be written."""
+    """Exception: an image in bands was stopped, and its file must not be written."""
 
 
 def _broken_pixels(picture: Picture) -> int:

@@ -145,7 +145,7 @@ def optional_stage(command: Any) -> Any:
 
 @dataclass(frozen=True)
 class StageOptions:
-    """Values of the options that ``stage_options`` added, by ``Row.key``."""
+    """Values of the options that ``stage_options`` added, by the keys of their table rows."""
 
     values: Mapping[str, Any]
 
@@ -158,7 +158,7 @@ class StageOptions:
         return self.values[key]
 
     def as_dict(self) -> dict[str, Any]:
-        """Returns the options' values as a dictionary, which a checkpoint stores."""
+        """Returns the values of the options as a dictionary, to be stored in a checkpoint."""
         return dict(self.values)
 
     def completed(self, before: dict[str, Any]) -> StageOptions:

@@ -38,8 +38,8 @@ class Prepared:
         options: Options, with the frame of a single image filled into the file names.
         resumed: Checkpoint that the render continues, or None.
         jobs: A job for each render product.
-        opened: The open stage, held until the stage is loaded, so that USD reads its layers only
-            once.
+        opened: The open stage. It is held until the stage is loaded, so that USD reads its layers
+            only once.
     """
 
     options: RenderOptions
@@ -49,7 +49,7 @@ class Prepared:
 
 
 def prepare(options: RenderOptions) -> Prepared:
-    """Checks everything that can fail before rendering, and builds the jobs.
+    """Checks options, files and settings before rendering, and builds the jobs.
 
     Raises:
         WavecombError: An option, a file or a setting is invalid.
@@ -121,8 +121,8 @@ def _peek(options: RenderOptions) -> tuple[list[ProductSettings], Any]:
     """Reads the stage's render settings.
 
     Returns:
-        One choice for each render product, and an object to hold until the stage is loaded, so that
-            USD reads its layers only once.
+        The settings of each render product, and an object. As long as this object is alive, USD
+            keeps the layers and need not read them again when the stage is loaded.
     """
     import_usd()
     from wavecomb.usd import peek_products
@@ -193,7 +193,7 @@ def _sampling(options: RenderOptions, resumed: Checkpoint | None) -> dict[str, A
 
 
 def _earlier(settings: dict[str, Any], *, sized: bool) -> dict[str, Any]:
-    """Returns settings of a resumed render for ``make_settings``.
+    """Returns arguments of ``make_settings`` from the settings of a resumed render.
 
     Args:
         settings: Settings of the checkpoint.
@@ -208,11 +208,11 @@ def _earlier(settings: dict[str, Any], *, sized: bool) -> dict[str, Any]:
 
 
 def _check_deep(options: RenderOptions, kept: Iterable[str]) -> None:
-    """Raises WavecombError unless --deep is used as in the render that is resumed.
+    """Raises WavecombError if only one of this and the resumed render uses --deep.
 
     Args:
         options: Options of the command.
-        kept: AOVs of the resumed render.
+        kept: AOVs that the resumed render keeps.
     """
     had = aov_names.DEEP in kept
     if had and options.deep is None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Images of ``wavecomb render`` and their files, by options and render products."""
+"""Determines the images of ``wavecomb render`` and their files."""
 
 from __future__ import annotations
 
@@ -59,11 +59,11 @@ class Product:
         return aov_names.DEFAULT if own is None else aov_names.expand(own)
 
     def settings(self, chosen: Mapping[str, Any], aovs: Sequence[str], resumed: bool) -> Any:
-        """Builds checked render settings.
+        """Builds render settings and checks them.
 
         Args:
-            chosen: Settings from the options and from the resumed render; "size" is that of
-                --size.
+            chosen: Settings from the options and from the resumed render. The entry "size" is the
+                value of --size.
             aovs: AOVs to keep.
             resumed: Whether a render is resumed, which fixes size and region.
         """
@@ -136,7 +136,7 @@ class Product:
 
 
 def plan_products(choices: Sequence[ProductSettings], options: RenderOptions) -> list[Product]:
-    """Returns the images that the stage names: one for each render product, with checked files.
+    """Returns the images that the stage names, one per render product; checks their files.
 
     Raises:
         WavecombError: An image has no file name, or an option applies to one image only.
@@ -174,7 +174,7 @@ def _product(choice: ProductSettings, options: RenderOptions, is_single: bool) -
 
 
 def _check_several(products: Sequence[Product], options: RenderOptions) -> None:
-    """Raises WavecombError for options of one image, and for names that products share."""
+    """Raises WavecombError for options that apply to one image, and for equal file names."""
     single = {
         "--png": options.png, "--deep": options.deep, "--stats": options.stats_file,
         "--resume": options.resume, "--checkpoint": options.checkpoint,

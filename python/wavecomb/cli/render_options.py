@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Options of commands that render: one dataclass whose fields declare them."""
+"""Options of commands that render, declared as the fields of a dataclass."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ Own = TypeVar("Own", bound="FileOptions")
 _COMPRESSIONS = ("none", "rle", "zips", "zip", "piz", "pxr24", "b44", "b44a", "dwaa", "dwab")
 
 WRITTEN = ("output", "png", "deep", "stats_file", "costs", "learn_to", "preview", "checkpoint")
-"""Fields of ``RenderOptions`` with files that the command writes."""
+"""Fields of ``RenderOptions`` that name files which the command writes."""
 NAMED = (*WRITTEN, "image", "learn_from", "resume")
-"""Fields with file names, in which a placeholder for the frame is filled."""
+"""Fields of ``RenderOptions`` whose file names may have a placeholder for the frame."""
 
 
 class _AovOption(click.Option):
@@ -98,7 +98,7 @@ class RenderOptions(FileOptions):
         image: The image that -o names, an EXR or a PNG; None if the stage names it.
         source: Options that load the stage.
         settings: Values of the render settings that were given.
-        whole: An option that needs the whole image in memory, or "" if there is none.
+        whole: Name of a given option that needs the whole image in memory, or "" without one.
     """
 
     output: str | None = declared(
@@ -296,7 +296,7 @@ class RenderOptions(FileOptions):
 
 
 def _interval(options: dict[str, Any], name: str, files: Sequence[str], default: float) -> float:
-    """Returns the seconds between writing files; raises WavecombError if none is written."""
+    """Returns the interval of an option in seconds; raises WavecombError without its files."""
     seconds: float | None = options[name]
     if seconds is not None and all(options[file] is None for file in files):
         needed = " or ".join(f"--{file}" for file in files)
@@ -329,4 +329,4 @@ render_options = add_options(
     ),
     setting_options(),
 )  # fmt: skip
-"""Image, duration and files: options of all commands that render images."""
+"""Options of all commands that render images, such as image size, time limit and files."""

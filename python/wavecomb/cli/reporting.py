@@ -30,10 +30,10 @@ if TYPE_CHECKING:
 
 
 class Reporter:
-    """Base class of reporters, which prints nothing; reporters do not show warnings or errors."""
+    """Base class of reporters, which prints nothing. Warnings and errors are shown elsewhere."""
 
     def loading(self, stage: str) -> contextlib.AbstractContextManager[LoadProgress | None]:
-        """Shows that the stage is loading; yields a callback for its progress, or None."""
+        """Shows that the stage is loading; yields a callback for loading progress, or None."""
         return contextlib.nullcontext()
 
     def begins(self, frame: str, number: int, count: int) -> None:
@@ -97,7 +97,7 @@ class Summary(Reporter):
         say(line)
 
     def finished(self, done: Done, report: LoadReport, files: Sequence[str]) -> None:
-        """Prints the summary, for a sequence with the figures of the last frame."""
+        """Prints the summary. The summary of a sequence has the statistics of its last frame."""
         if self._frame:
             say(f"{self._frame}:")
             files = [f"{len(files)} files"]
@@ -126,7 +126,7 @@ class Lines(Reporter):
     def finished(self, done: Done, report: LoadReport, files: Sequence[str]) -> None:
         """Prints a line {"event": "done", ...}.
 
-        For a sequence, the line has the figures of the last frame.
+        The line of a sequence has the statistics of its last frame.
         """
         stats = done.stats
         self._lines.event(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Entering the sandbox of a command, with the files that the command will write."""
+"""Restarts a command in the sandbox, with access to the files that it will write."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from wavecomb.cli.render_options import WRITTEN, RenderOptions
 from wavecomb.run.frame_names import fill, has_place, parse_frames
 
 MOST_NAMES = 100_000
-"""Largest number of file names given to the sandbox. Longer sequences allow their folder
-instead."""
+"""Largest number of file names given to the sandbox. For longer sequences, the sandbox gives access
+to their folder instead."""
 
 
 def enter_to_render(
@@ -21,8 +21,10 @@ def enter_to_render(
 
     Args:
         options: Options of the command.
-        further: More files to write, with placeholders for the frame.
-        gpu: Whether denoising may use GPU devices; None means: if the options ask for denoising.
+        further: Further files that the command will write; names may have a placeholder for the
+            frame.
+        gpu: Whether denoising may use GPU devices; None allows them if the options request
+            denoising.
     """
     from wavecomb.run.isolation.outputs import Outputs
     from wavecomb.run.isolation.supervisor import enter
@@ -74,7 +76,7 @@ def _make_folders(names: Iterable[str]) -> None:
 
 
 def enter_to_read(outputs: Iterable[str | None], *, split: str | None = None) -> None:
-    """Restarts a command in the sandbox whose output files are all known.
+    """Restarts a command in the sandbox, given all of its output files.
 
     Args:
         outputs: Files to write.

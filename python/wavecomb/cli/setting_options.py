@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Options of commands: one for each render setting, and helpers that declare other options."""
+"""Declares options of commands, among them one for each render setting."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ASKED_FOR_ELSEWHERE = (
     *("width", "height", "spp", "min_spp", "adaptive", "noise", "time_limit", "error"),
     *("progressive", "costs"),
 )
-"""Settings that have a hand-written option with more features, such as --size or --costs FILE."""
+"""Settings that have a separately declared option with more features, such as --size."""
 
 _EDGES = re.compile(r"(-?\d+)[xX](-?\d+)")
 _METAVARS = {"integer": "N", "number": "X", "text": "TEXT"}
@@ -45,7 +45,7 @@ class SettingPlaceholder(click.Option):
 
 
 def setting_options(only: Iterable[str] | None = None) -> Callable[[F], F]:
-    """Adds an option for each setting in ``only``, by default all without a hand-written option.
+    """Adds an option for each setting in ``only``, or all without a separate option.
 
     The decorated command must be a ``SettingCommand`` (cli/command.py). The value of an option that
     is not given is None.
@@ -82,7 +82,7 @@ def _offered(row: Setting) -> Iterable[float]:
 
 
 class _Steps(click.Choice):
-    """Option type for a few numbers or a word for 0; help shows only the numbers ``offered``."""
+    """Type of options that accept a few numbers, or a word for 0; help shows ``offered``."""
 
     def __init__(self, row: Setting, offered: Iterable[float]) -> None:
         super().__init__([row.zero, *(f"{step:g}" for step in row.steps)])
@@ -90,7 +90,7 @@ class _Steps(click.Choice):
         self._offered = [row.zero, *(f"{step:g}" for step in offered)]
 
     def get_metavar(self, *_: Any, **__: Any) -> str:
-        """Returns the choices that help shows, which are those this build supports."""
+        """Returns the choices for the help, which are the numbers that this build supports."""
         return f"[{'|'.join(self._offered)}]"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
@@ -149,7 +149,7 @@ ImageSize = tuple[int, int] | Percent
 
 
 class SizeType(click.ParamType):
-    """Type of --size. ``SettingCommand`` has joined the two words of a size to one."""
+    """Type of --size. ``SettingCommand`` joins the two words of a size to one word."""
 
     name = "size"
 

@@ -27,7 +27,7 @@ SECONDS = {
 
 
 def times_text(seconds: Mapping[str, float]) -> str:
-    """Returns the time of an image and its parts, without parts that took no time.
+    """Returns the time of an image, and the times of its steps that took any time.
 
     >>> times_text({"load": 0.5, "build": 0.1, "render": 61.0, "denoise": 0.0, "write": 0.2})
     '1 min 02 s: load 0.500 s, build 0.100 s, render 1 min 01 s, writing 0.200 s'
@@ -73,7 +73,7 @@ def print_summary(
 
 
 def _samples_text(stats: Mapping[str, Any]) -> str:
-    """Returns number and rate of samples, passes and error."""
+    """Returns a line with the number and rate of samples, the passes and the error."""
     from wavecomb.run.progress import count_text, time_text
     from wavecomb.run.stats import rendered_pixels
 
@@ -183,7 +183,7 @@ def _transport_line(chosen: Mapping[str, Any]) -> str:
 
 
 def _aiming_line(aiming: Mapping[str, Any]) -> str:
-    """Returns a line about the targets of light paths."""
+    """Returns a line about the targets at which light paths are aimed."""
     from wavecomb.run.progress import count_text, time_text
 
     found = (

@@ -112,9 +112,10 @@ def run(
     Args:
         job: Result of ``submit``, or the job's folder.
         workers: Number of worker processes on this machine.
-        on: Cluster to use instead of ``workers``, as for `--on`, such as "dask:tls://HOST:8786".
+        on: Cluster to use instead of local ``workers``, a value of `--on` such as
+            "dask:tls://HOST:8786".
         threads: Threads of each process; 0 uses the job's value, else an equal share of the cores.
-        progress: Called regularly; stops the run if it returns True.
+        progress: Function that is called regularly; the run stops if it returns True.
 
     Returns:
         Files of the images.

@@ -28,8 +28,8 @@ from wavecomb.run.bands import sum_stats
 from wavecomb.run.stats import write_stats
 
 _MORE_CHECKS = 4
-"""After borders were too narrow, new borders allow for this many error checks more than any tile
-took."""
+"""If borders were too narrow, tiles are rendered again with borders that allow for this many more
+error checks than any tile took."""
 
 
 class NarrowBorder(WavecombError):
@@ -121,11 +121,11 @@ def _room(part: RenderedTile, name: str, window: Rectangle) -> NDArray[Any]:
 
 
 def _verify_borders(parts: Sequence[RenderedTile]) -> None:
-    """Raises NarrowBorder if a tile took more passes than some border allows for.
+    """Raises NarrowBorder if a tile took more passes than the border of any tile allows for.
 
-    An adaptive tile decides about each of its pixels as the whole image would, as long as all
-    pixels that the decision depends on were rendered. Tiles fit together if no tile took more
-    passes than each border allows for.
+    An adaptive render decides from the error of a pixel and its neighbours whether to sample the
+    pixel further. A tile makes the same decisions as the whole image only if its border contains
+    all pixels that affect them, which holds if no tile took more passes than its border allows for.
     """
     most = max(part.passes for part in parts)
     for part in parts:
@@ -298,7 +298,7 @@ class Outcome:
 
     @property
     def state(self) -> str:
-        """State of an image: "done", "failed" or "unfinished"."""
+        """State of the job: "done", "failed" or "unfinished"."""
         if self.images_done == self.images:
             return "done"
         return "failed" if self.failed else "unfinished"

@@ -12,7 +12,7 @@ from wavecomb.farm.job import Task
 _BATCH_S = 0.5
 """Time that a batch of small tiles should take, in seconds."""
 _MIN_BATCHES = 4
-"""Smallest number of batches for each worker, so that workers end at about the same time."""
+"""Smallest number of batches for each worker, so that workers finish at about the same time."""
 
 
 @dataclass
@@ -23,7 +23,7 @@ class Batch:
         tiles: Tiles to render; empty for work on a whole image.
         image: Index of the image to plan or to assemble, or -1.
         attempt: Number that differs between repetitions of the same work.
-        is_plan: Whether the work is the image's pilot renders.
+        is_plan: Whether the work consists of the image's pilot renders.
     """
 
     tiles: list[Task]

@@ -23,12 +23,12 @@ _TURN_S = 0.2
 _RETRY_S = 5.0
 """Time between rescheduling of tasks that wait for a worker, in seconds."""
 _NOBODY_S = 60.0
-"""Time to wait for new workers when all are gone, in seconds."""
+"""Time to wait for new workers when all workers have ended, in seconds."""
 _ASSEMBLY_PRIORITY = 1
 
 
 class Run:
-    """Run of a job by one client."""
+    """One run of a farm job: submits tasks to Dask and receives their results."""
 
     def __init__(
         self,
@@ -119,7 +119,7 @@ class Run:
         return self._workers.count(self._machine)
 
     def _choose_machine(self, images: list[int]) -> str:
-        """Chooses the machine class of this run: most finished tiles first, then most workers."""
+        """Chooses the machine class with the most finished tiles, or else the most workers."""
         # Wait until all workers that were started at the same time have registered with the
         # scheduler.
         time.sleep(_TURN_S if self._cluster.wait_s else 0.0)
@@ -359,11 +359,11 @@ def run(
         dashboard: Port of Dask's dashboard; None starts no dashboard.
         show: Called with the progress of the job.
         warn: Called once with each distinct warning about the stage.
-        say: Called with the address of the dashboard.
+        say: Function that is called with the address of the dashboard.
         is_stopped: Returns whether to stop the run. Finished tiles are kept.
 
     Raises:
-        WavecombError: The settings are invalid, or no workers came, or all are gone.
+        WavecombError: The settings are invalid, no workers connected, or all workers have ended.
     """
     from wavecomb import _core
 

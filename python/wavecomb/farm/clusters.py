@@ -33,7 +33,7 @@ MAX_WORKERS = 1024
 DASK_WAIT_S = 60.0
 """Time to wait for the first worker of an existing Dask cluster, in seconds."""
 _QUERY_S = 1.0
-"""Time between queries of the list of workers, in seconds."""
+"""Time between queries of the scheduler for its workers, in seconds."""
 _SLURM_WORKERS = 4
 _CONNECT_S = 10.0
 _ANSWER_S = 60.0
@@ -41,7 +41,7 @@ _ANSWER_S = 60.0
 _ASK_S = 10.0
 """Time between calls of squeue, in seconds."""
 _MAX_STARTS = 5
-"""Largest number of worker starts in a row without any progress."""
+"""Largest number of consecutive worker starts without a finished task."""
 _END_S = 5.0
 _SCRIPT = '#!/bin/sh\nexec "$@" --nthreads "${SLURM_CPUS_PER_TASK:-1}"\n'
 
@@ -142,7 +142,7 @@ class Cluster:
 
 
 class Workers:
-    """The workers of a cluster, by machine class."""
+    """Counts of the workers in a cluster for each machine class."""
 
     def __init__(self, cluster: Cluster) -> None:
         self._client = cluster.client

@@ -69,7 +69,8 @@ class Shot:
 class StageFile:
     """A file that the stage needs, such as a layer, texture or IES profile.
 
-    A machine that sees the same ``bytes`` and ``mtime_ns`` need not read the file to verify it.
+    If size (``bytes``) and time (``mtime_ns``) of a file are unchanged on a machine, the file is
+    not read to verify its hash.
     """
 
     path: str
@@ -108,7 +109,7 @@ class Job:
         strict: Whether a missing file is an error.
         maps: Pairs of folders. Machines without the first folder of a pair look for its files in
             the second.
-        isa: Instruction set that all workers must use; None allows any, but the same for all.
+        isa: Instruction set that all workers must use; None allows any set that all workers share.
         version: Version of Wavecomb.
     """
 
@@ -132,7 +133,7 @@ class Job:
     version: str = field(default_factory=version)
 
     def __post_init__(self) -> None:
-        """Creates the caches of values that are computed once for each image."""
+        """Creates caches for values that depend on the image and are computed once."""
         object.__setattr__(self, "_rectangles", {})
         object.__setattr__(self, "_image_keys", {})
 

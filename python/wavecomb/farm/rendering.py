@@ -93,7 +93,7 @@ class Renderer:
             checks: Number of error checks that a border must allow for; 0 chooses a likely number.
             plan: File that ``plan`` has written for the image. Without the file, the tile repeats
                 the pilot renders, with the same results.
-            with_job: Whether the file also stores the job.
+            with_job: Whether the tile file also stores the job.
             replacing: As in ``save_tile``.
 
         Returns:
@@ -160,7 +160,7 @@ class Renderer:
     def _settings(
         self, image: int, shot: Shot, tile: Rectangle, checks: int
     ) -> tuple[Settings, Rectangle, int]:
-        """Returns a tile's settings, the rectangle to render and the error checks it allows for."""
+        """Returns a tile's settings, its rectangle with border, and the border's error checks."""
         from wavecomb import _core
 
         chosen = {**shot.settings, "threads": self._threads or shot.settings.get("threads", 0)}
@@ -226,7 +226,7 @@ class Renderer:
     def _empty(self, task: Task, shot: Shot, frames: Frames, picture: Picture) -> Picture | None:
         """Renders a small image whose last pixel has the values of pixels without samples.
 
-        The result is None if no pixel of the whole image lacks samples, and for all tiles but the
+        Returns None if all pixels of the whole image have samples, and for all tiles except the
         first.
         """
         cropped = shot.settings.get("region") is None or shot.settings.get("crop")
@@ -273,7 +273,7 @@ def load_plan(path: Path, key: str) -> bytes | None:
 
 
 def error_checks_for(shot: Shot, checks: int = 0) -> int:
-    """Returns the number of error checks that borders allow for.
+    """Returns the number of error checks of adaptive sampling that tile borders allow for.
 
     The number is ``checks`` or, if ``checks`` is 0, a likely number. Renders that are not adaptive
     need no error checks.

@@ -30,9 +30,9 @@ failed."""
 _LOOK_S = 1.0
 _own_maps = os.environ.get(VARIABLE)
 _kept: Any = None
-"""Id, ``Renderer`` and folder of the job that this process worked on last."""
+"""Id, ``Renderer`` and folder of the last job of this process, kept for its next task."""
 _current: Any = None
-"""Dask's worker and the key of the current task, for reading from any thread."""
+"""Dask worker and key of the current task, which any thread of this process may read."""
 _read: dict[str, str] = {}
 """SHA-256 of each stage file that this process has read and USD may have cached."""
 
@@ -76,7 +76,7 @@ class FarmPlugin(WorkerPlugin):
     name = "wavecomb-farm"
 
     def __init__(self, isa: str | None, hang_s: float) -> None:
-        """Takes the fields ``isa`` and ``hang_s`` of ``Job``."""
+        """Creates the plugin. The arguments are the fields ``isa`` and ``hang_s`` of ``Job``."""
         self._isa = isa
         self._hang_s = hang_s
         self._ended = threading.Event()
@@ -177,8 +177,8 @@ def plan_image(folder: str, maps: list[Pair], job: str, machine: str, image: int
     """Writes the results of an image's pilot renders; takes the arguments of ``render_tiles``.
 
     Returns:
-        A dictionary: ``full``, why nothing can be written here, or ""; ``worker``, its address;
-        ``warnings``, lines.
+        A dictionary: ``full``, the reason why no file can be written, or ""; ``worker``, the
+        address of the worker; ``warnings``, lines.
     """
     from wavecomb.farm.rendering import Stopped
 

@@ -35,8 +35,8 @@ _LAYERS = ("beauty", "albedo", "normal", "depth", "samples", "error", "variance"
 AOV = "aov."
 _KEY, _FACTS, _CHECKSUM = (f"wavecomb:part_{name}" for name in ("key", "facts", "checksum"))
 _EXACT = 1 << 24
-"""Largest integer up to which all integers are exact as 32-bit floats. ``MAX_SPP`` does not exceed
-this number."""
+"""Largest integer N for which 32-bit floats represent all integers from 0 to N exactly. ``MAX_SPP``
+does not exceed this number."""
 
 
 class InvalidTile(WavecombError):
@@ -96,8 +96,8 @@ def replacing_quickly(path: Path) -> Iterator[Path]:
     """Yields a temporary name beside ``path``, and renames it to ``path`` at the end.
 
     Unlike ``output_file.replacing``, this function does not search the folder for leftovers of
-    killed processes, which is slow in folders with many files. The whole folder is removed when its
-    image is finished.
+    killed processes, which is slow in folders with many files. The folder of tiles, with any
+    leftovers, is removed when its image is finished.
     """
     if not path.parent.is_dir():
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -136,7 +136,7 @@ def save_tile(
         key: Key from ``Job.tile_key``.
         number: Index of the tile.
         tile: Rectangle of the tile in the image, in pixels.
-        rendered: Rectangle of ``picture`` in the image: the tile, perhaps with a border.
+        rendered: Rectangle of ``picture`` in the image, which is the tile with its border, if any.
         machine: Class of this machine.
         checks: Number of error checks that the border allows for.
         empty: An image whose last pixel has the values of pixels without samples.

@@ -25,8 +25,8 @@ TILES_OF_A_WORKER = 4
 _CHECK_SAMPLES = 16
 """Samples per pixel between two error checks of the core (render/passes/pass_plan.cpp)."""
 _REACH = 4
-"""Distance in pixels over which one error check has an effect: 2 for the mean of errors over
-neighbouring pixels, and 2 for spreading the marks of unfinished pixels."""
+"""Distance in pixels over which one error check has an effect. It is 2 for the mean of errors over
+neighbouring pixels plus 2 because unfinished pixels mark their neighbours as unfinished."""
 _MIN_PILOT_SAMPLES = 2_000_000
 """Number of samples of an image from which pilot renders may decide (kMinAutoSamples in
 render/pilots/guiding_training.cpp)."""
@@ -123,7 +123,7 @@ def choose_tiles(
 
 
 def error_checks(settings: Mapping[str, Any]) -> int:
-    """Returns the number of error checks before all pixels of an adaptive render have all samples.
+    """Returns how many error checks an adaptive render makes before it has taken all samples.
 
     >>> error_checks({"spp": 64, "min_spp": 16})
     3
@@ -141,7 +141,8 @@ def error_checks(settings: Mapping[str, Any]) -> int:
 def max_error_checks(settings: Mapping[str, Any]) -> int:
     """Returns the number of error checks that the border of an adaptive tile allows for.
 
-    The number is 4 more than ``error_checks``, because pixels that resume late take further checks.
+    The number is 4 more than ``error_checks``, because pixels whose sampling stops and later
+    resumes need further checks.
     """
     return error_checks(settings) + 4
 
@@ -169,7 +170,7 @@ def grown(tile: Rectangle, border: int, region: Rectangle) -> Rectangle:
 
 
 def check_reproducible(settings: Mapping[str, Any]) -> None:
-    """Raises WavecombError for settings whose images differ from render to render."""
+    """Raises WavecombError for settings whose renders are not reproducible."""
     if settings.get("time_limit"):
         raise WavecombError(
             "--time-limit: the sample count would depend on the machine, so a farm's images would "
@@ -198,9 +199,9 @@ def needs_whole(settings: Mapping[str, Any]) -> str:
 
 
 def is_better_whole(settings: Mapping[str, Any]) -> bool:
-    """Returns whether each tile has a high cost in addition to its pixels.
+    """Returns whether tiles cost much more than their pixels, so that images stay whole.
 
-    A border and tracing of all light paths have such a cost.
+    Adaptive tiles need borders, and each tile of a render with light paths traces all light paths.
     """
     return bool(settings.get("adaptive")) or settings.get("transport") in ("light", "bdpt")
 

@@ -12,7 +12,7 @@ from PySide6.QtGui import QAction, QKeySequence, QUndoStack
 from PySide6.QtWidgets import QWidget
 
 TITLE = "title"
-"""Property of an action with its original text, for actions whose text changes."""
+"""Name of a property of QAction that stores the original text if the text changes."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ def make_action(entry: Entry, window: QWidget, viewport: QWidget) -> QAction:
 
 
 def keypad(digit: int) -> tuple[str, str]:
-    """Returns the shortcuts of a digit, in the number row and on the keypad."""
+    """Returns the shortcuts for a digit key in the number row and on the keypad."""
     return str(digit), f"Num+{digit}"
 
 
@@ -70,7 +70,7 @@ def keypad(digit: int) -> tuple[str, str]:
 
 
 class HistoryActions(QObject):
-    """Updater of the texts of undo and redo, such as "Undo intensity of /Key".
+    """Updates the texts of the actions Undo and Redo, such as "Undo intensity of /Key".
 
     Args:
         stack: Undo stack, whose texts are appended to the actions' texts.
@@ -105,7 +105,7 @@ class HistoryActions(QObject):
 
 
 class UnsavedMark(QObject):
-    """Updater of the mark in the window's title that stands for unsaved edits."""
+    """Updates the mark in the window's title that shows unsaved edits."""
 
     def __init__(self, stack: QUndoStack, window: QWidget) -> None:
         super().__init__(window)

@@ -37,8 +37,8 @@ BASELINES = {
     "renderer": "wavecomb",
     "case": "off",
 }
-"""Level of each factor that all other levels are compared with; numeric factors use their smallest
-level."""
+"""Baseline level of each factor, with which other levels are compared. The baseline of a numeric
+factor is its smallest level."""
 
 POLICIES = (
     *("none", "program", "material", "texture", "texture-locality", "cost-benefit"),
@@ -48,10 +48,9 @@ POLICIES = (
 
 PLACEBO = "random-runs"
 BEST_FIRST = (BEST, COSTS)
-"""Oracle policies that define the possible gain of an order; the first that was run is used."""
+"""Oracle policies, in order of preference, whose times define the possible gain of ordering."""
 BOUNDS = (PLACEBO, *ORACLES)
-"""Policies that are only bounds: they show how much an order can gain, but are of no practical
-use."""
+"""Policies without practical use, whose times bound the possible gain of ordering."""
 
 
 @dataclass(frozen=True)
@@ -134,8 +133,8 @@ def cells(
 ) -> Iterator[tuple[dict[str, Any], pd.DataFrame]]:
     """Yields groups of runs that agree in every setting except ``vary`` and ``ignore``.
 
-    A case of a suite may change settings that have no column. The name of the configuration
-    separates groups of such cases.
+    A case of a suite may change settings without a column in runs.csv. Runs of such cases are
+    distinguished by the name of their configuration.
     """
     varied = {vary} if isinstance(vary, str) else set(vary)
     keys = [name for name in SETTINGS if name not in varied and name not in ignore]
@@ -151,7 +150,7 @@ def cells(
 
 
 def rounds(group: pd.DataFrame, by: str, metric: str) -> tuple[list[Any], NDArray[np.float64]]:
-    """Returns levels and their values, (rounds, levels), with NaN for missing runs."""
+    """Returns the levels, and the metric as (rounds, levels) with NaN for missing runs."""
     table = group.pivot_table(index="repetition", columns=by, values=metric, aggfunc="mean")
     levels = in_order(by, list(table.columns))
     return levels, table[levels].to_numpy(np.float64)
@@ -201,8 +200,8 @@ def label(cell: dict[str, Any], names: Sequence[str]) -> str:
 def varying(cells: Sequence[dict[str, Any]]) -> list[str]:
     """Returns "stage" and all other settings in which groups of runs differ.
 
-    The value of a factor is included if no other setting distinguishes groups. A renderer may use a
-    smaller value than the suite requests, for example if a wave is larger than the image.
+    The column `factor_value`, the value that the suite requests, is included if no other setting
+    differs. A renderer may use a smaller value, for example if a wave is larger than the image.
     """
     # Names of columns that a report's heading already shows, or that are functions of another
     # column.
@@ -224,11 +223,11 @@ def labelled(
     default: str = "all",
     leave_out: Sequence[str] = (),
 ) -> pd.DataFrame:
-    """Returns a table of rows with the short names of their groups of runs.
+    """Returns rows as a table with a column of short names that distinguish their groups of runs.
 
     Args:
-        rows: Rows with the settings of their groups of runs.
-        only: Settings to use; empty means all.
+        rows: Rows that hold the settings of a group of runs.
+        only: Settings that may appear in names; empty means all.
         column: Column for the names.
         default: Name if no setting varies.
         leave_out: Settings that may differ within a group of runs.

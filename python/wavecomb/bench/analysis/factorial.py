@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Effects in a factorial experiment, and predicted against measured costs of materials."""
+"""Computes effects in a factorial experiment, and compares predicted with measured costs."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ def effects(runs: pd.DataFrame, metric: str) -> pd.DataFrame:
     levels were run. If the suite is not a full factorial, other differences must not count as
     interaction.
 
-    The metric T is the mean over rounds. Intervals resample rounds; p-values test the effects of
-    single rounds, with Holm's correction over all effects of the table.
+    The metric T is the mean over rounds. Intervals come from resampling rounds. p-values test the
+    effects of single rounds, with Holm's correction over all effects of the table.
 
     Returns:
         One row per effect: ``kind`` ("main" or "interaction"), ``factor``, ``level``, ``baseline``,
@@ -107,7 +107,7 @@ def _term(of: tuple[tuple[str, Any], ...], base: dict[str, Any], cells: int) -> 
 
 
 def _rows(terms: list[dict[str, Any]], weights: list[Array], values: Array) -> list[dict[str, Any]]:
-    """Estimates all effects at once, each from the combinations with a nonzero weight."""
+    """Estimates all effects together. Each uses the combinations with a nonzero weight."""
 
     def statistic(means: Array) -> Array:
         logs = np.log(means)
@@ -172,12 +172,13 @@ def calibration(costs: pd.DataFrame, prediction: str) -> dict[str, Any]:
         slope, intercept: of the weighted least squares line measured = intercept + slope predicted
 
     A perfect prediction has r2 = 1, slope 1, intercept 0. r2 is negative if the mean would have
-    predicted better. Intervals resample materials, each with all its runs, since a new scene would
-    have other materials.
+    predicted better. Intervals come from resampling materials, each with all its runs, because the
+    predictions should hold for other materials.
 
     Returns:
         ``r2``, ``slope``, ``intercept`` (ns), ``mean_error`` (relative, weighted), each with
-            ``_low`` and ``_high``; ``materials``, ``runs``. Empty with fewer than three materials.
+            ``_low`` and ``_high``; ``materials``, ``runs``. The dictionary is empty with fewer than
+            three materials.
     """
     kept = costs.dropna(subset=[prediction])
     if kept.empty:

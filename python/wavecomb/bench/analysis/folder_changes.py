@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Changes between two result folders, as ratios of equal configurations."""
+"""Compares two result folders by the ratios of configurations that both contain."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Change:
         high: Upper end of the 95 % interval of the ratio; None with too few runs.
         runs: Number of runs in BEFORE and AFTER.
         p: p-value of no change, corrected for all configurations.
-        verdict: Verdict in a word.
+        verdict: Verdict on the change, such as "faster".
     """
 
     config: str
@@ -71,7 +71,7 @@ class FolderComparison:
         pictures: Number of pairs of runs with equal configuration, seed and size that have an image
             in both folders.
         pictures_different: Number of pairs of runs whose images are not bit-identical.
-        warnings: Reasons to read the ratios with care.
+        warnings: Warnings that the ratios may not be reliable.
     """
 
     metric: str

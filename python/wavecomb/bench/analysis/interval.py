@@ -26,8 +26,8 @@ RESAMPLES = 4000
 SEED = 20260117
 SAME_WITHIN = 0.01
 MIN_ROUNDS_FOR_BOOTSTRAP = 8
-"""Smallest number of rounds for a bootstrap. Resamples of n values stay within their range, which
-covers the mean with a probability of at most 1 - 2^(1 - n)."""
+"""Smallest number of rounds for a bootstrap. A bootstrap interval cannot exceed the range of its n
+values, and this range covers the true mean with probability 1 - 2^(1 - n) at most."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ def bootstrap(rounds: Array, statistic: Statistic, *, positive: bool = False) ->
 
     Args:
         rounds: (n, k): one row per round, one column per configuration; NaN marks a missing run,
-            and the mean is then that of the other runs.
+            which means leave out.
         statistic: Maps means, (..., k), to statistics, (..., m).
         positive: Whether the statistics are ratios or times.
 
@@ -77,7 +77,7 @@ def bootstrap(rounds: Array, statistic: Statistic, *, positive: bool = False) ->
     n = len(rounds)
 
     def of_rows(index: NDArray[np.intp], axis: int = -1) -> Array:
-        """Statistics, (m, ...), of the rows ``index``, (..., rows)."""
+        """Returns the statistics (m, ...) of resamples, given by row indices (..., rows)."""
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.moveaxis(statistic(_nanmean(rounds[index])), -1, 0)
 
@@ -94,10 +94,9 @@ def bootstrap(rounds: Array, statistic: Statistic, *, positive: bool = False) ->
 
 
 def bca(of_rows: Callable[..., Array], n: int, *, widened: bool) -> tuple[Array, Array]:
-    """Ends of SciPy's BCa intervals of statistics of resampled rows.
+    """Returns both ends of SciPy's BCa bootstrap interval for each statistic.
 
-    The percentile interval replaces the BCa interval for a statistic that does not vary with single
-    rows.
+    A statistic that does not change when any single row is left out gets the percentile interval.
 
     Args:
         of_rows: Maps row indices, (..., rows), to statistics, (m, ...).
@@ -135,7 +134,7 @@ def _nanmean(values: Array) -> Array:
 def _jackknife(
     value: Array, of_rows: Callable[[NDArray[np.intp]], Array], n: int, positive: bool
 ) -> tuple[Array, Array]:
-    """Ends of t intervals with the jackknife's standard error."""
+    """Returns both ends of t intervals, which use the jackknife's standard error."""
     stats = needed("scipy.stats", "the analysis")
     left_out = of_rows(np.array([np.delete(np.arange(n), k) for k in range(n)]))
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -177,12 +176,12 @@ def holm(p_values: Sequence[float]) -> list[float]:
 
 
 def verdict(estimate: Estimate, p: float, words: tuple[str, str] = ("faster", "slower")) -> str:
-    """Returns the verdict on a ratio: below 1, above 1, the same within 1 %, or not shown.
+    """Returns whether a ratio is below 1, above 1, within 1 % of 1, or undecided, in words.
 
     Args:
         estimate: The ratio.
         p: p-value, corrected for all verdicts of the table.
-        words: Verdicts for ratios below and above 1.
+        words: Words for the verdicts below 1 and above 1, such as "faster" and "slower".
     """
     if estimate.n < 2:
         return "one run"

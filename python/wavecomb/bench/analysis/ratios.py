@@ -97,7 +97,7 @@ def means(
 
 
 STRATA = ("experiment", "renderer", "lanes", "roulette")
-"""Settings that pooled cells have in common, because the effect of an order depends on them."""
+"""Settings that define a stratum; cells with different values of these are not pooled."""
 
 
 def order_effects(runs: pd.DataFrame, metric: str = "shade_and_order_s") -> pd.DataFrame:
@@ -108,14 +108,15 @@ def order_effects(runs: pd.DataFrame, metric: str = "shade_and_order_s") -> pd.D
         ratio(p) = exp(mean over cells of log(T_p / T_none))
         share(p) = log(T_placebo / T_p) / log(T_placebo / T_oracle), of the same means
 
-    The share of the gain is 0 for the placebo and 1 for the oracle. Shares are computed only if the
-    interval of the gap T_placebo / T_oracle excludes 1, because otherwise no gain is shown.
+    The share of the possible gain is 0 for the placebo policy and 1 for the oracle. Shares are
+    computed only if the interval of the gap T_placebo / T_oracle excludes 1, because otherwise no
+    gain is shown.
 
     Returns:
         One row per stratum and policy: ``stratum``, ``policy``, ``cells``, ``n``; ``ratio``,
             ``low``, ``high``, ``p`` (Holm's over the table), ``verdict``; ``placebo_ratio`` and
-            ``share`` with ``_low`` and ``_high``; ``gap_shown``. The rows of policies that are only
-            bounds come last.
+            ``share`` with ``_low`` and ``_high``; ``gap_shown``. Rows of policies without practical
+            use (``BOUNDS``) come last.
     """
     strata: dict[tuple[Any, ...], list[pd.DataFrame]] = {}
     for cell, group in cells(runs.dropna(subset=[metric]), "policy"):
@@ -132,7 +133,7 @@ def order_effects(runs: pd.DataFrame, metric: str = "shade_and_order_s") -> pd.D
 
 
 def _stratum(key: dict[str, Any], groups: list[pd.DataFrame], metric: str) -> list[dict[str, Any]]:
-    """Returns the rows of one stratum, with policies that are only bounds last."""
+    """Returns the rows of one stratum. Policies in ``BOUNDS`` come last."""
     shared = set.intersection(*(set(group["policy"]) for group in groups))
     policies = in_order("policy", sorted(shared))
     wide = needed("pandas", "the analysis").concat(
@@ -148,7 +149,7 @@ def _stratum(key: dict[str, Any], groups: list[pd.DataFrame], metric: str) -> li
     best = next((policies.index(name) for name in BEST_FIRST if name in policies), None)
 
     def pooled(means: Array) -> Array:
-        """Returns the mean logarithm over cells, (..., policies)."""
+        """Returns the mean over cells of the logarithm of each policy's time, (..., policies)."""
         shape = (*means.shape[:-1], len(groups), len(policies))
         return np.log(means.reshape(shape)).mean(axis=-2)
 
@@ -198,8 +199,8 @@ def regrets(runs: pd.DataFrame, metric: str = "render_s") -> pd.DataFrame:
 
     The smallest mean is taken over the fixed policies, without the bounds and "adaptive". Every
     bootstrap resample selects the best policy again, so the interval accounts for the uncertainty
-    about the best policy. The smallest of noisy means is biased low, so regret is overstated rather
-    than understated.
+    about the best policy. The smallest of several noisy means is biased low, so the regret is
+    overstated rather than understated.
 
     Returns:
         One row per cell and policy: ``cell``, ``policy``, ``n``, ``regret``, ``low``, ``high``,

@@ -50,7 +50,7 @@ class Row:
         low: Lower end of the interval; NaN without an interval.
         high: Upper end of the interval; NaN without an interval.
         colour: Colour of the point and its whiskers.
-        hollow: Whether the row is a bound or a baseline, drawn with a hollow point.
+        hollow: Whether the point is hollow, which marks a bound or a baseline.
     """
 
     name: str
@@ -202,7 +202,7 @@ _FACTORS = {
 
 
 def order_figure(table: pd.DataFrame, name: str, metric_words: str) -> CaptionedFigure | None:
-    """Draws the ratio of each policy to the placebo, with the oracle, in a panel per stratum."""
+    """Draws the time of each policy relative to the placebo, with one panel per stratum."""
     if table.empty or table["placebo_ratio"].isna().all():
         return None
     panels = panels_of(
@@ -220,7 +220,7 @@ def order_figure(table: pd.DataFrame, name: str, metric_words: str) -> Captioned
 
 
 def regret_figure(table: pd.DataFrame, name: str) -> CaptionedFigure | None:
-    """Draws the regret of each policy, in a panel per group of comparable runs."""
+    """Draws the regret of each policy, with one panel for each group of comparable runs."""
     if table.empty or table["cell"].nunique() > MAX_PANELS:
         return None
     panels = panels_of(
@@ -272,7 +272,7 @@ def _effect_row(row: Any, name: str) -> Row:
 def cost_figure(
     costs: pd.DataFrame, lines: Mapping[str, Mapping[str, Any]], name: str
 ) -> CaptionedFigure | None:
-    """Draws measured over predicted cost of each material, in a panel per prediction."""
+    """Draws the ratio of measured to predicted cost of each material, for each prediction."""
     kept = [(column, line) for column, line in lines.items() if line]
     if costs.empty or not kept:
         return None

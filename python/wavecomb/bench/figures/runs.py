@@ -65,7 +65,7 @@ COHERENCE = (
 def ratio_figure(
     table: pd.DataFrame, name: str, title: str, x_label: str, factor: str
 ) -> CaptionedFigure | None:
-    """Draws ``ratios`` as forest plots, one panel per cell; None if there are too many cells."""
+    """Draws a table of ``ratios``, one panel per cell; returns None if cells are too many."""
     if table.empty or table["cell"].nunique() > MAX_PANELS:
         return None
     panels = panels_of(
@@ -82,7 +82,7 @@ def ratio_figure(
 
 
 def pipeline(runs: pd.DataFrame, name: str) -> CaptionedFigure | None:
-    """Draws stacked phases of each policy, in a panel per group of comparable runs."""
+    """Draws the phase times of each policy as stacked bars, one panel per group of runs."""
     groups = list(cells(runs.dropna(subset=["shade_s"]), "policy"))
     if not groups or len(groups) > MAX_PANELS:
         return None
@@ -121,7 +121,7 @@ def pipeline(runs: pd.DataFrame, name: str) -> CaptionedFigure | None:
 
 
 def coherence(runs: pd.DataFrame, name: str) -> CaptionedFigure | None:
-    """Draws four measures of coherence by policy, with a series per group of comparable runs."""
+    """Draws four measures of coherence for each policy, one series per group of runs."""
     groups = list(cells(runs.dropna(subset=["run_length_coherence"]), "policy"))
     if not groups or len(groups) > 6:
         return None
@@ -168,12 +168,12 @@ def curve(
     x_label: str,
     series: str = "policy",
 ) -> CaptionedFigure | None:
-    """Draws metrics over a numeric column, with a line for each series and logarithmic axes.
+    """Draws metrics over a numeric column on logarithmic axes, with a line for each series.
 
     Args:
         runs: Runs that differ only in x and the series.
         x: Column with numbers.
-        metrics: Column and axis label, one panel each.
+        metrics: Column and axis label of each panel.
         name: Name of the figure.
         title: Title of the figure.
         x_label: Label of the x axis, with its unit.
@@ -269,7 +269,7 @@ def error_over_time(runs: pd.DataFrame, name: str) -> CaptionedFigure | None:
 
 
 def intervals(runs: pd.DataFrame, x: str, metric: str) -> list[tuple[float, float, float, float]]:
-    """Returns x, the mean and the ends of its interval, for each x."""
+    """Returns, for each value of column `x`, the value, the mean metric and its interval."""
     levels, values = rounds(runs.dropna(subset=[metric]), x, metric)
     order = np.argsort(levels)
     found = bootstrap(values, lambda means: means, positive=True)

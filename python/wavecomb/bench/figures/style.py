@@ -28,7 +28,7 @@ INK = "#1a1b1e"
 """Colour of text, axes and baselines. In the HTML report it becomes the text colour of the page."""
 FAINT = "#8a8d93"
 WHISKERS = 4.0
-"""Largest extent of a logarithmic axis beyond the points, as a factor."""
+"""Factor by which a logarithmic axis may extend beyond the points to show whiskers."""
 INTERVALS = "Whiskers: 95 % intervals"
 MAX_PANELS = 12
 """Largest number of panels of a figure; figures with more panels are left out."""
@@ -56,7 +56,7 @@ class CaptionedFigure:
     Attributes:
         name: Name of the files; unique in a report.
         title: Short title.
-        caption: Content and unit of the figure, kind of whiskers, number of runs.
+        caption: Caption with content and unit, the meaning of whiskers, and the number of runs.
         figure: Matplotlib figure.
     """
 
@@ -82,7 +82,7 @@ def figure(
     share_x: bool = False,
     share_y: bool = False,
 ) -> tuple[Figure, list[Axes]]:
-    """Creates a figure of the column's width.
+    """Creates a figure as wide as a column of text (``WIDTH``).
 
     ``heights`` are the relative heights of the rows. Returns the figure and its axes, row by row.
     """
@@ -111,7 +111,7 @@ def colour(index: int) -> str:
 
 
 def label_ends(axes: Axes, ends: Sequence[tuple[float, float, str, str]]) -> None:
-    """Labels series at their last points (x, y, text, colour) without overlaps."""
+    """Writes the label of each series at its last point, without overlaps."""
     figure_ = axes.get_figure()
     assert figure_ is not None
     point = figure_.dpi / 72.0
@@ -160,8 +160,8 @@ def fixed(value: float, digits: int) -> str:
 def clipped(low: float, high: float, values: Sequence[float]) -> tuple[float, float]:
     """Returns limits of a logarithmic axis that cut off very long whiskers.
 
-    Intervals of two or three disturbed runs can span decades. Long intervals then extend beyond the
-    axes, and the points remain distinguishable.
+    The interval of two or three disturbed runs can span several powers of ten. Long intervals then
+    extend beyond the axes, and the points remain distinguishable.
 
     >>> clipped(1e-9, 1e6, [0.5, 2.0])
     (0.125, 8.0)

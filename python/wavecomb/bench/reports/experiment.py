@@ -43,7 +43,7 @@ SCHEDULING = ("lanes", "wave_size", "policy", "roulette", "ray_order", "shadow_o
 
 
 def experiment(out: Writer, name: str, runs: pd.DataFrame) -> None:
-    """Writes everything about one experiment."""
+    """Writes the section of the report about one experiment."""
     out.begin(f"Experiment {name}")
     repetitions = count_words(runs.groupby("config").size())
     out.add(
@@ -70,7 +70,7 @@ def experiment(out: Writer, name: str, runs: pd.DataFrame) -> None:
 def compared(
     runs: pd.DataFrame, factor: str, columns: Mapping[str, str], ignore: Sequence[str] = ()
 ) -> dict[str, pd.DataFrame]:
-    """Returns tables of ``ratios`` by title, for the columns whose values are all positive."""
+    """Returns the ``ratios`` of each column whose values are all positive, by title."""
     measured = {words: runs[column].dropna() for words, column in columns.items()}
     tables = {
         words: ratios(runs, factor, columns[words], ignore=ignore)
@@ -99,7 +99,7 @@ def _ray_orders(out: Writer, key: str, runs: pd.DataFrame) -> None:
 
 
 def _cases(out: Writer, name: str, runs: pd.DataFrame) -> None:
-    """Compares named settings that change together with the case "off"."""
+    """Compares each named case of settings with the case "off"."""
     if BASELINES["case"] not in set(runs["case"]) or runs["case"].nunique() < 2:
         return
     columns = {"relMSE": "rel_mse", "render": "render_s", "efficiency": "efficiency"}
@@ -120,7 +120,7 @@ def _renderers(out: Writer, key: str, runs: pd.DataFrame) -> None:
 
 
 def _curves(out: Writer, key: str, runs: pd.DataFrame) -> None:
-    """Draws times over the factor of a scaling experiment, or over lanes and wave sizes."""
+    """Draws times over the factor of a scaling experiment, or over lane count and wave size."""
     times = (("shade_and_order_s", "shade + order, thread s"), ("render_s", "render, s"))
     series = next(
         (n for n in ("policy", "ray_order", "renderer", "roulette") if runs[n].nunique() > 1),
@@ -171,7 +171,7 @@ def _counters(out: Writer, runs: pd.DataFrame) -> None:
 
 
 def _policies(out: Writer, name: str, runs: pd.DataFrame) -> None:
-    """Shows times by policy, the gain of an order, and the regret of a choice."""
+    """Shows the times, the gain and the regret of each policy."""
     columns = {"shade": "shade_s", "render": "render_s", "shade + order": "shade_and_order_s"}
     metrics = compared(runs, "policy", columns)
     note = (
@@ -233,7 +233,7 @@ def _order_findings(name: str, order: pd.DataFrame) -> list[str]:
 
 
 def _bound_words(part: pd.DataFrame) -> str:
-    """States the gain of the oracles, or returns "" without placebo and oracle."""
+    """Returns a sentence on the gain of the oracle policies, or "" if they were not run."""
     known = part.dropna(subset=["placebo_ratio"]).set_index("policy")
     words = {
         BEST: "The best order of runs by recorded true costs",

@@ -43,7 +43,7 @@ class RunImage:
 
 @dataclass(frozen=True)
 class Shot:
-    """All images of one stage and frame, with the golden image. Titles are unique in a report."""
+    """All images of one stage and frame, with the golden image. Titles in a report are distinct."""
 
     stage: str
     golden: NDArray[Any] | None
@@ -74,7 +74,7 @@ def shots(results: Results) -> list[Shot]:
 
 
 def _titled(row: dict[str, Any], frames: Iterable[list[tuple[dict[str, Any], Path]]]) -> str:
-    """Returns the stage, with renderer and size if other frames show the same stage."""
+    """Returns a title: the stage, with renderer and size if other images show this stage."""
     others = [frame[0][0] for frame in frames if frame[0][0]["stage"] == row["stage"]]
     parts = [str(row["stage"])]
     if len({other["renderer"] for other in others}) > 1:
@@ -112,7 +112,7 @@ def _name(rows: Sequence[dict[str, Any]], everything: Sequence[tuple[dict[str, A
 
 
 def viewer(shot: Shot) -> Viewer | None:
-    """Returns the images of a shot for flipping and subtraction, or None if there is only one."""
+    """Returns a viewer that compares the images of a stage, or None if there is only one."""
     entries = [(kept.name, kept.pixels) for kept in shot.kept]
     if shot.golden is not None:
         entries.append(("golden (converged)", shot.golden))

@@ -40,8 +40,8 @@ if TYPE_CHECKING:
 
 LARGEST_SVG = 150_000
 LARGEST_PNG = 120_000
-"""Largest size in bytes of a PNG beside a Markdown page, because a repository keeps every
-version."""
+"""Largest size in bytes of a PNG beside a Markdown page; larger figures are shrunk, because a
+repository keeps every version of a file."""
 _HERE = Path(__file__).parent
 
 
@@ -51,11 +51,11 @@ def build(folder: Path, markdown: Path | None = None) -> Path:
     Args:
         folder: DIR.
         markdown: Also write this .md file, with a folder of figures beside it. The Markdown page
-            has the same text, tables and figures as the HTML page, without viewers and folded
-            parts.
+            has the same text, tables and figures as the HTML page, but no image viewers and no
+            collapsed sections.
 
     Raises:
-        WavecombError: The folder holds no results, a file in it is damaged, or a library of the
+        WavecombError: The folder holds no results, a file in it is damaged, or a library of the pip
             extra "bench" is missing.
         OSError: The report cannot be written.
     """
@@ -120,7 +120,7 @@ def _write(path: Path, text: str) -> None:
 
 
 def _copy_figures(out: Writer, folder: Path) -> dict[str, str]:
-    """Copies the figures of all sections; returns their files, as SVG or, if too large, PNG."""
+    """Copies the figures of all sections, as SVG, or PNG if that is too large; returns files."""
     folder.mkdir(parents=True, exist_ok=True)
     files = {}
     for part in (part for section in out.sections for part in section.parts):
@@ -225,7 +225,7 @@ def _about(out: Writer, results: Results) -> None:
 
 
 def _settings(results: Results) -> Table:
-    """Returns a folded table of the settings used by each configuration."""
+    """Returns a collapsed table of the settings used by each configuration."""
     names = ["spp", "threads", "lanes", "wave_size", "max_depth"]
     by_config = results.runs.groupby("config", sort=False)
     used = by_config[["width", "height", *names]].first().assign(runs=by_config.size())
@@ -268,7 +268,7 @@ FEW_ROUNDS = 5
 
 
 def _equal_in() -> list[str]:
-    """Returns the columns in which runs agree if their images must be bit-identical."""
+    """Returns columns of runs.csv; images of runs with equal values must be bit-identical."""
     rows = options.settings().values()
     same_bits = {row.name for row in rows if not row.changes_bits} - {"spp"}
     return [
@@ -278,7 +278,7 @@ def _equal_in() -> list[str]:
 
 
 def warnings_of(results: Results) -> list[str]:
-    """Returns reasons to read the figures with care, the most serious first."""
+    """Returns warnings about the results of the report, the most serious first."""
     lines: list[str] = []
     machine, runs, failed = results.machine, results.runs, results.failed
     _, different = equality(runs)

@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 from wavecomb.bench.figures.style import CaptionedFigure, fixed, lay_out, save, svg
 
 MAX_ROWS = 60
-"""Largest number of rows of a table that is not folded."""
+"""Largest number of rows of a table that is shown expanded."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Text(Part):
-    """A paragraph, or a heading with ``mark="heading"``; all other marks are CSS classes."""
+    """A paragraph, or a heading if ``mark`` is "heading". Other values are CSS classes."""
 
     kind = "text"
     text: str
@@ -56,7 +56,7 @@ class Code(Part):
 
 @dataclass(frozen=True)
 class Facts(Part):
-    """Names and values, which may be nested tables of names and values. Omits empty values."""
+    """Table of names and values, where a value may itself be such a table. Omits empty values."""
 
     kind = "facts"
     values: Mapping[str, Any]
@@ -69,7 +69,7 @@ class Cell:
     Attributes:
         text: The value.
         note: Smaller text after the value, such as an interval.
-        mark: CSS classes: "word" for text, "better", "worse".
+        mark: Names of CSS classes: "word" for cells with text, "better" or "worse" for ratios.
     """
 
     text: str
@@ -79,7 +79,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Table(Part):
-    """A table whose first column holds the row headings; equal neighbours in it are merged.
+    """A table whose first column has the row headings; equal adjacent headings are merged.
 
     Attributes:
         caption: Title.
@@ -95,7 +95,7 @@ class Table(Part):
     note: str = ""
 
     def groups(self) -> Iterator[tuple[str, list[Sequence[Cell]]]]:
-        """Yields the heads of rows with the remaining cells of their rows."""
+        """Yields each row heading with the other cells of all rows that have this heading."""
         for head, rows in itertools.groupby(self.rows, key=lambda row: row[0].text):
             yield head, [row[1:] for row in rows]
 
@@ -111,7 +111,7 @@ def table(
     note: str = "",
     summary: str = "",
 ) -> Table:
-    """Makes a table of cells and plain texts. Always folds a long table."""
+    """Makes a table of cells and plain texts. Tables with many rows are shown collapsed."""
     filled = [[c if isinstance(c, Cell) else Cell(c) for c in row] for row in rows]
     if not summary and len(rows) > MAX_ROWS:
         summary = f"{caption} ({len(rows)} rows)"
@@ -125,7 +125,7 @@ class Figure(Part):
     Attributes:
         name: Name of the figure's files, unique in a report.
         title: Short title.
-        caption: Content, unit, kind of whiskers, number of runs.
+        caption: Caption with content, unit, meaning of whiskers and number of runs.
         drawing: <svg> element.
     """
 
@@ -138,10 +138,10 @@ class Figure(Part):
 
 @dataclass(frozen=True)
 class Viewer(Part):
-    """Images that can be flipped and subtracted; Markdown leaves it out.
+    """Viewer that flips and subtracts images; the Markdown page has no viewer.
 
     Attributes:
-        title: Stage and frame.
+        title: Name of the stage, and the frame.
         images: Names and file addresses of the images.
     """
 

@@ -27,7 +27,7 @@ def ratio_table(
 
     Args:
         caption: Title of the table.
-        metrics: Titles and tables of ``ratios``; the last one provides the verdict.
+        metrics: Tables of ``ratios`` by title; the last table provides the verdict.
         level_words: Heading of the level column.
         note: Text below.
     """
@@ -53,7 +53,7 @@ def ratio_table(
 
 
 def order_table(found: pd.DataFrame, caption: str) -> Table:
-    """Shows the verdict on each order."""
+    """Shows the verdict on the shading order of each policy."""
     rows = []
     for row in found.itertuples():
         none = row.policy == "none"
@@ -85,7 +85,7 @@ def order_table(found: pd.DataFrame, caption: str) -> Table:
 
 
 def regret_table(found: pd.DataFrame, caption: str) -> Table:
-    """Shows mean and worst regret of each policy over cells."""
+    """Shows the mean and the largest regret of each policy over all groups of runs."""
     rows: list[list[Cell | str]] = []
     for policy, part in found.groupby("policy", sort=False):
         worst = part.loc[part["regret"].idxmax()]
@@ -107,7 +107,7 @@ def regret_table(found: pd.DataFrame, caption: str) -> Table:
 
 
 def effects_table(found: pd.DataFrame, caption: str) -> Table:
-    """Shows all effects of a factorial experiment, folded."""
+    """Shows all effects of a factorial experiment in a collapsed table."""
     rows: list[list[Cell | str]] = [
         [
             str(row.kind),
@@ -143,7 +143,7 @@ def mean_table(
 
 
 def calibration_table(lines: Mapping[str, Mapping[str, Any]], words: Mapping[str, str]) -> Table:
-    """Shows r2, slope and mean error of the predictions."""
+    """Shows how well shading costs were predicted: r2, slope and mean error."""
     rows: list[list[Cell | str]] = [
         [
             words[column],

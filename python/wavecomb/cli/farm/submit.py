@@ -120,8 +120,8 @@ def ask_plan(request: dict[str, Any]) -> dict[str, Any]:
     """Reads the stage in a child process, so that a crash in a library becomes a one-line error.
 
     Args:
-        request: Options of ``farm submit``, or {"again": a job as JSON}. The request must be short,
-            since it becomes a command-line argument of the child and of its sandbox.
+        request: Options of ``farm submit``, or {"again": JOB} to plan an existing job again. The
+            request must be short, because it is passed as a command-line argument.
 
     Returns:
         A dictionary with ``job``, as JSON, and ``learned``, the guiding data in base64 or None.
@@ -191,7 +191,7 @@ def plan_command(text: str) -> None:
 def _tuples(value: Any) -> Any:
     """Converts the lists in parsed JSON to tuples, the type of click's repeated options.
 
-    The entry "again" is a job, which remains unchanged.
+    The entry "again", which is a job, is not converted.
     """
     if isinstance(value, dict):
         return {key: v if key == "again" else _tuples(v) for key, v in value.items()}

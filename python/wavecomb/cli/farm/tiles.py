@@ -50,7 +50,7 @@ def check_options(options: Mapping[str, Any], what: str = "a farm") -> None:
 
     Args:
         options: Values of the options.
-        what: Name of the feature that does not support the options, for the message.
+        what: Name for the message of the feature that does not support the options.
     """
     learn_from = options["learn_from"] if options["learn_from"] == BEFORE else None
     for option, given, instead in (
@@ -82,7 +82,7 @@ def _check_tile(text: str, options: RenderOptions) -> tuple[int, int]:
 
 
 def job_of(prepared: Prepared, **more: Any) -> Job:
-    """Builds a farm job from a command's options, still without tiles and files.
+    """Builds a farm job from a command's options; tiles and files are filled in later.
 
     Raises:
         WavecombError: --costs names a file.

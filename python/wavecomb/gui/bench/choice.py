@@ -97,7 +97,7 @@ class Choice:
     """Arguments of a benchmark.
 
     Attributes:
-        suite: Name or TOML file.
+        suite: Name of the suite, or path of its TOML file.
         folder: Results folder.
         stages: Stages to run; an empty list means all stages.
         repetitions: Number of repetitions; None means the suite's default.
