@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Skips that CI rejects, long tests (see parts.py), and fixtures shared by test files."""
+"""Fixtures of several test files, rules for skipped tests, and selection of long tests."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def plain_room(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def forked(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also fork the processes that the package starts, such as readers of stages."""
+    """Start the package's processes, such as stage readers, by the fork server of the tests."""
     import forks
 
     monkeypatch.setattr(subprocess, "Popen", forks.Popen)

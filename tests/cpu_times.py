@@ -9,11 +9,11 @@ import sys
 from pathlib import Path
 
 FILE = "WAVECOMB_CPU_TIMES"
-"""Environment variable with the name of a JSON file to write: seconds by test."""
+"""Environment variable that names the JSON file to write, which maps tests to CPU seconds."""
 PROPERTY = "cpu_s"
-"""Name of the property of a test report that holds the seconds."""
+"""Name of the test report property that holds the CPU seconds of a test."""
 _LEAST_S = 60.0
-"""Minimum total for which a table is printed."""
+"""Minimum total CPU time in seconds for which a table is printed."""
 _FILES, _TESTS = 30, 40
 _last: float = 0.0
 _by_test: dict[str, float] = {}
@@ -22,7 +22,7 @@ _file = os.environ.pop(FILE, None)
 
 
 def since_last() -> float:
-    """Return the seconds of CPU time since the last call in this process; 0 at first."""
+    """Return the CPU seconds since the last call in this process; the first call returns 0."""
     global _last
     times = os.times()
     now = times.user + times.system + times.children_user + times.children_system

@@ -46,7 +46,7 @@ def wavecomb(*arguments: object, **options: Any) -> subprocess.CompletedProcess[
 
 
 def code(text: str, *arguments: object, **options: Any) -> subprocess.CompletedProcess[str]:
-    """Run `python -c TEXT ARGUMENTS`; the imports of `wavecomb` are done already."""
+    """Run `python -c TEXT ARGUMENTS` in a process that has already imported `wavecomb`."""
     return run(["-c", text, *map(str, arguments)], **options)
 
 
@@ -215,7 +215,7 @@ def _import_everything() -> None:
 
 
 def _serve(channel: socket.socket) -> dict[str, Any] | None:
-    """Fork for each request and return it in the child; None when the tests have ended."""
+    """Fork for each request. Return the request in the child, and None after the tests."""
     while True:
         data, descriptors, _, _ = socket.recv_fds(channel, 2 * _MOST, 16)
         with contextlib.suppress(ChildProcessError):

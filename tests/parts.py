@@ -65,7 +65,7 @@ def missing(part: str) -> str:
 
 
 def needs(*parts: str) -> pytest.MarkDecorator:
-    """Mark tests that have the given requirements; `missing` lists the possible names."""
+    """Mark tests that need the given requirements; `missing` documents their names."""
     reasons = [f"{part}: {reason}" for part in parts if (reason := missing(part))]
     return pytest.mark.skipif(bool(reasons), reason="needs " + "; ".join(reasons))
 

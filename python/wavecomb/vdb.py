@@ -107,7 +107,8 @@ class Bricks:
     Attributes:
         origins: (n, 3) int32, index of the first voxel of each brick.
         values: (n, 8, 8, 8) or (n, 8, 8, 8, 3), float16 or float32, with x slowest.
-        index_to_object: As in ``GridInfo``, like background, kind, voxels and box.
+        index_to_object: Transform (4, 4) as in ``GridInfo``. The attributes background, kind,
+            voxels and box are also those of ``GridInfo``.
         not_finite: Number of infinite and NaN values.
         negative: Number of negative values.
         least: Smallest value, at most 0.

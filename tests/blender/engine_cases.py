@@ -77,7 +77,7 @@ def _message(scene: Any) -> str:
 
 
 def errors(folder: Path) -> None:
-    """Failures that must not end Blender."""
+    """Causes failures that must not end Blender."""
     scene, _ = _ball()
     program = os.environ["WAVECOMB"]
     os.environ["WAVECOMB"] = str(folder / "nothing")
@@ -109,7 +109,7 @@ def errors(folder: Path) -> None:
 
 
 def full(folder: Path) -> None:
-    """A full disk: files of the stage, then the image, exceed the largest size of a file."""
+    """Simulates a full disk by a limit on file sizes, for stage, correction layer and image."""
     import resource
 
     scene, thing = _ball(1)
@@ -129,7 +129,7 @@ def full(folder: Path) -> None:
 
 
 def _direct(engine: Any, scene: Any) -> str:
-    """Returns the message for a scene without camera, which Blender refuses before the engine."""
+    """Renders a scene without a camera, which Blender itself refuses; returns the message."""
     found = _message(scene)
     if "camera" in found.lower():
         return "has no camera"
@@ -137,7 +137,7 @@ def _direct(engine: Any, scene: Any) -> str:
 
 
 def animation(folder: Path) -> None:
-    """24 frames with motion blur of a moving object, a deforming mesh, a light and the camera."""
+    """Renders 24 frames with motion blur of an object, a deforming mesh, a light and the camera."""
     import bpy
 
     scene, thing = _ball(4)
@@ -198,7 +198,7 @@ def _layers(scene: Any, file: Path) -> dict[str, np.ndarray]:
 
 
 def passes(folder: Path) -> None:
-    """All passes of two view layers, of which one lacks an object; a border; denoising."""
+    """Renders all passes of two view layers (one hides an object), with border and denoising."""
     import bpy
 
     scene, _ = _ball(4)
@@ -246,7 +246,7 @@ def passes(folder: Path) -> None:
 
 
 def cryptomatte(folder: Path) -> None:
-    """Ids of objects, materials and assets are those of Cycles, in two view layers."""
+    """Collects Cryptomatte ids of objects, materials and assets from Cycles and Wavecomb."""
     scene, ball = _ball(4)
     ball.name = "Ball é.001"
     child = build.cube(build.principled("painted wood"), at=(2, 0, 0.5), size=0.8)
@@ -269,7 +269,7 @@ def cryptomatte(folder: Path) -> None:
 
 
 def report(folder: Path) -> None:
-    """Lists of nodes that depend on the viewer, which cannot be baked, and of displacement."""
+    """Renders a material with a Light Path node and displacement; collects the report."""
     scene, ball = _ball(1)
     material = ball.material_slots[0].material
     node = build.add(material, "ShaderNodeLightPath")

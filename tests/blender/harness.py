@@ -98,10 +98,11 @@ def render(scene: Any, engine: str, seed: int) -> tuple[Image, float]:
 
 
 def compare(cycles: list[Image], wavecomb: list[Image]) -> dict[str, float]:
-    """Compares renders with two seeds each, by means of blocks.
+    """Compares the block means of Cycles and Wavecomb renders, each with two seeds.
 
     Returns:
-        ``ratio``, the mean of Wavecomb over that of Cycles, and ``noise``, its standard error.
+        ``ratio``: Mean of Wavecomb divided by the mean of Cycles. ``noise``: Standard error of
+            ``ratio``.
         ``colour``: Largest deviation of a channel's ratio from 1.
         ``outside``: Fraction of blocks that differ by more than 2 % and four standard errors.
         ``worst``: Largest relative difference of a block.

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Writes docs/blender-parity.md: ``python page.py FOLDER [--update]``.
 
-FOLDER is the output of ``run.py``. With ``--update``, scenes that it lacks keep row and image.
-PARITY_SPP is that of ``run.py``. Needs Pillow.
+FOLDER is the output of ``run.py``. With ``--update``, scenes that FOLDER lacks keep their rows and
+images. Set the environment variable PARITY_SPP as for ``run.py``. Needs Pillow.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def main(folder: Path, kept: Kept) -> None:
 
     Args:
         folder: Output of ``run.py``.
-        kept: Rows of scenes that it may lack.
+        kept: Rows of scenes that ``folder`` may lack.
     """
     rows = {f.stem: json.loads(f.read_text()) for f in sorted(folder.glob("*.json"))}
     rows = {name: row for name, row in rows.items() if "ratio" in row and "group" in row}
@@ -97,7 +97,7 @@ def _line(name: str, row: dict[str, Any]) -> str:
 
 
 def _sheet(folder: Path, names: list[str], before: list[str], file: Path) -> None:
-    """Writes a sheet; tiles of scenes without an image come from the sheet as it was."""
+    """Writes a sheet; copies tiles of scenes without an image from the existing sheet."""
     old = Image.open(file).convert("RGB") if file.exists() else None
     boxes = {name: _corner(i) for i, name in enumerate(before)}
     count = -(-len(names) // COLUMNS)

@@ -26,7 +26,7 @@ class Expected:
 
 @dataclass(frozen=True)
 class ParityScene:
-    """A scene made by script.
+    """A scene that a script creates.
 
     Attributes:
         name: Name of the scene and of its images.
@@ -34,7 +34,7 @@ class ParityScene:
         make: Function that fills the empty scene.
         expected: Bounds of the comparison.
         spp: Samples per pixel of each of two renders.
-        messages: Words that the report of the translation must contain.
+        messages: Words that the report of the export must contain.
     """
 
     name: str

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Measures export and the first visible image: ``python speed.py [TRIANGLES] [RUNS]``.
 
-Prints one JSON row per run with the seconds and CPU seconds of Blender's exporter alone, of
-exporter and correction together, and from F12 to the first image, with Wavecomb's process. Needs
-the variable WAVECOMB, the program to run.
+Prints one JSON row per run. A row has the seconds and CPU seconds of Blender's exporter alone, of
+the exporter and the correction layer, and of the time from F12 to the first image (including
+Wavecomb's process). The environment variable WAVECOMB names the program to run.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ def first_image(engine: Any) -> tuple[float, float]:
 
 
 def run(scene: Any) -> dict[str, Any]:
-    """Measures each of the three once."""
+    """Measures the exporter, the whole export and the first image, each once."""
     engine, export = (sys.modules[f"wavecomb_blender.{n}"] for n in ("engine", "export"))
     depsgraph = bpy.context.evaluated_depsgraph_get()
     folder = tempfile.mkdtemp()

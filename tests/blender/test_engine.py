@@ -26,7 +26,7 @@ def _rows(done: subprocess.CompletedProcess[str]) -> dict[str, object]:
 
 
 def test_command_line_writes_the_same_image(blender: Run, tmp_path: Path) -> None:
-    """F12 and ``wavecomb render`` on the exported stage give the same values."""
+    """A render by F12 and ``wavecomb render`` on the exported stage give the same values."""
     row = _rows(blender(str(HERE / "engine_cases.py"), "same", str(tmp_path)))
     assert row["same"] is True
 
@@ -41,7 +41,7 @@ def test_errors_are_one_line(blender: Run, tmp_path: Path) -> None:
 
 
 def test_full_disk_is_one_line(blender: Run, tmp_path: Path) -> None:
-    """A disk without room for geometry, correction or image: one line each; Blender lives on."""
+    """On a full disk, each failed write gives one error line, and Blender continues."""
     row = _rows(blender(str(HERE / "engine_cases.py"), "full", str(tmp_path)))
     for name in ("stage", "correction", "image"):
         lines = [line for line in str(row[name]).splitlines() if line.startswith("Error: ")]
@@ -52,7 +52,7 @@ def test_full_disk_is_one_line(blender: Run, tmp_path: Path) -> None:
 
 
 def test_report_lists_what_is_missing(blender: Run, tmp_path: Path) -> None:
-    """A node that cannot be baked and an approximation are one line each, with their owner."""
+    """The report has one line for an unsupported node and one for an approximation."""
     row = _rows(blender(str(HERE / "engine_cases.py"), "report", str(tmp_path)))
     assert row["error"] == ""
     lines = row["lines"]
@@ -62,7 +62,7 @@ def test_report_lists_what_is_missing(blender: Run, tmp_path: Path) -> None:
 
 
 def test_cryptomatte_has_the_ids_of_cycles(blender: Run, tmp_path: Path) -> None:
-    """Ids of the first rank, with the number of pixels, in two view layers."""
+    """Cryptomatte ids of the first rank equal those of Cycles and cover as many pixels."""
     row = _rows(blender(str(HERE / "engine_cases.py"), "cryptomatte", str(tmp_path)))
     passes = row["passes"]
     assert isinstance(passes, dict) and len(passes) == 6
@@ -109,7 +109,7 @@ def test_blend_file(blender: Run, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("content", [b"", b"BLENDER-v501nonsense"])
 def test_broken_blend_file_is_one_line(blender: Run, tmp_path: Path, content: bytes) -> None:
-    """A file that Blender cannot open."""
+    """A .blend file that Blender cannot open causes one error line."""
     done = blender(str(HERE / "engine_cases.py"), "blend", str(tmp_path))
     python = str(_rows(done)["python"])
     (tmp_path / "b.blend").write_bytes(content)

@@ -28,7 +28,7 @@ def cornell_in(folder: Path) -> Path:
 
 
 MACHINE = "wavecomb-test"
-"""Machine class in tests that render in this process."""
+"""Name of the machine class for tests that render in this process."""
 
 
 def render_all(folder: Folder, image: int = 0, checks: int = 0) -> None:

@@ -152,7 +152,7 @@ def deep(rng: random.Random, folder: Path) -> Path:
 
 
 def doubling(rng: random.Random, folder: Path) -> Path:
-    """Writes prims that contain the next one at least twice: a few lines, billions of prims."""
+    """Writes a few prims that expand to billions, since each contains the next at least twice."""
     levels, width = rng.choice(((6, 2), (10, 2), (14, 2), (30, 2), (8, 8), (3, 16), (64, 2)))
     how = rng.randrange(4)
     text = ""

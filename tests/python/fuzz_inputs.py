@@ -266,7 +266,7 @@ def vdb_bytes(name: str = "a.vdb", packed: str = "none", bits: str = "32") -> by
 
 
 def _nvdb(rng: random.Random, mutate: Mutation) -> bytes:
-    """Returns a .nvdb file that is mutated anywhere, in its headers, or at nonzero words.
+    """Returns a .nvdb file with mutations anywhere, only in its headers, or only at nonzero words.
 
     Most of a .nvdb file is zeros that are not read.
     """

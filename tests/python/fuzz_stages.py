@@ -54,7 +54,7 @@ class Verdict:
         number: Number of the case within its kind.
         outcome: rendered, warned, refused or contained (a library crashed, and the user got one
             line); wrong or hang, which are faults.
-        said: The message of the loader, or a description of the fault.
+        said: Message of the loader, or description of the fault.
         seconds: Time of the worker or of the command.
         death: How the worker ended, if it ended.
     """
@@ -196,7 +196,7 @@ def environment(place: Path) -> dict[str, str]:
 
 
 def strays(place: Path, before: set[Path], case: Path) -> list[str]:
-    """Returns new files in a folder outside of the case."""
+    """Returns the new files in a folder, except those of the case."""
     now = {path for path in place.rglob("*") if not path.is_relative_to(case)}
     return sorted(str(path) for path in now - before if "tmp" not in path.parts[-2:])
 
@@ -204,7 +204,7 @@ def strays(place: Path, before: set[Path], case: Path) -> list[str]:
 def command_line(case: Path, limit_s: float, *, named: bool = False) -> tuple[str, str]:
     """Runs ``wavecomb`` on a case as a user would. Returns (outcome, said).
 
-    ``named``: the stage itself names its image files.
+    ``named`` says whether the stage itself names its image files.
     """
     words = words_for(case)
     out = Path(words[words.index("-o") + 1])

@@ -86,7 +86,7 @@ def judge(stage: str) -> tuple[str, str]:
 
 
 def watch_writes(inside: str) -> list[str]:
-    """Returns a list of paths outside of a folder that Python writes to from now on."""
+    """Starts to record the paths outside of a folder that Python writes to; returns the list."""
     written: list[str] = []
     writing = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC
 

@@ -116,9 +116,7 @@ class Node:
 
 
 def run(value, points):
-    """Evaluates a value at points. Returns the components, an array (n, components), and the
-    operation count.
-    """
+    """Evaluates a value at points; returns an array (n, components) and the operation count."""
     return assemble(dict(enumerate(fit(value, len(value))))).run(points)
 
 

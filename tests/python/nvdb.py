@@ -39,9 +39,9 @@ def write(path: str | Path, grids: Sequence[Mapping[str, Any]], packed: str = "n
 
     Args:
         path: Output file.
-        grids: With ``bits`` ("4", "8", "16", "n"), values are quantised by leaf. There are no
-            half-precision grids.
-        packed: "none", "zip" or "blosc".
+        grids: Grids as for ``vdb.write``. The entry ``bits`` ("4", "8", "16" or "n") quantises the
+            values of each leaf. Half-precision grids are not supported.
+        packed: Compression, which is "none", "zip" or "blosc".
     """
     program = writer()
     assert program is not None

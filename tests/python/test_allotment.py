@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Setting ``allocate``: sample counts for all schedules, budget, resuming, refused settings."""
+"""Sample allocation: sample counts in all schedules, budget, resuming, refused settings."""
 
 from __future__ import annotations
 

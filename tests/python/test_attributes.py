@@ -132,7 +132,7 @@ def test_numbers_of_a_material_and_its_fallback(tmp_path):
 
 
 def test_nodes_of_networks_read_primvars(tmp_path):
-    """A constant geompropvalue folds, a varying one is read, and a second uv set is a primvar."""
+    """Constant geompropvalue nodes are folded; varying primvars and a second UV set are read."""
     nodes = """def Shader "G" { uniform token info:id = "ND_geompropvalue_float"
             string inputs:geomprop = "wear"
             float inputs:default = 0.5

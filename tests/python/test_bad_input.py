@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Bad input ends in one clear line: no traceback, no crash, no partial file."""
+"""Bad input causes one clear error line, without a traceback, crash or partial file."""
 
 from __future__ import annotations
 

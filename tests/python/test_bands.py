@@ -72,7 +72,7 @@ def test_bands_are_the_whole_picture(stage: Path, tmp_path: Path, words: tuple[s
 
 @pytest.mark.slow
 def test_files_beside_it(stage: Path, whole: Path, tmp_path: Path) -> None:
-    """PNG, AOV files and statistics equal those of a render in one piece."""
+    """PNG, AOV files and statistics of a render in bands equal those of a render in one piece."""
     file, png, stats = (tmp_path / name for name in ("a.exr", "a.png", "a.json"))
     done = forks.wavecomb(
         "render", str(stage), "-o", str(file), "--png", str(png), "--stats", str(stats), *WORDS,
@@ -167,9 +167,7 @@ def grows(folder: Path) -> bool:
 @pytest.mark.slow
 @pytest.mark.parametrize("frames", [False, True])
 def test_a_stopped_picture(stage: Path, tmp_path: Path, frames: bool) -> None:
-    """A stopped render of a single image writes empty rows; a stopped frame of a sequence is not
-    written.
-    """
+    """A stopped single image gets empty rows; a stopped frame of a sequence is not written."""
     file = tmp_path / ("a.1.exr" if frames else "a.exr")
     name = str(tmp_path / "a.#.exr") if frames else str(file)
     words = ["--frames", "1-2"] if frames else []

@@ -178,7 +178,7 @@ def test_markdown_page(folder: Path) -> None:
 
 @pytest.mark.slow
 def test_markdown_says_what_the_page_says(folder: Path, tree: ElementTree.Element) -> None:
-    """The Markdown has the page's headings, findings, captions and unfolded tables."""
+    """The Markdown has the headings, findings, captions and visible tables of the HTML page."""
     text = " ".join((folder.parent / "docs" / "made-up.md").read_text(encoding="utf-8").split())
     silent = ("Read the figures with care", "Words")
     for heading in texts(tree, "h2"):

@@ -52,7 +52,7 @@ OF_NAME: dict[str, Any] = {
     "aperture_blades": 5.0,
     "lens_map": [[0.0, 0.0, 1.0, 0.0], [0.0, 1.0, 1.0, 1.0]],
 }
-"""Values of camera parameters with a smaller range."""
+"""Non-default values of camera parameters that accept a smaller range than their kind."""
 
 
 def _other(row: CameraParameter) -> Any:

@@ -123,7 +123,7 @@ def test_exposure_multiplies_light_and_nothing_else(tmp_path):
 
 
 def test_orthographic_picture_is_a_closed_form(tmp_path):
-    """Silhouette and depth of a sphere in orthographic projection, independent of distance."""
+    """An orthographic image of a sphere has the exact silhouette and depth at any distance."""
     text = SKY + BALL + 'def Camera "Cam" { token projection = "orthographic"\n'
     text += "float horizontalAperture = 40\nfloat verticalAperture = 40\nPLACE }"
     size = 32
@@ -146,7 +146,7 @@ def test_orthographic_picture_is_a_closed_form(tmp_path):
 
 
 def test_every_scheduling_gives_the_same_bits(tmp_path):
-    """Cameras with parallel rays, with rays in all directions, and with a lens."""
+    """All schedules give the same bits for orthographic, panoramic and thin-lens cameras."""
     text = SKY + BALL + 'def Sphere "Far" { double radius = 4\n' + back(-9) + "}\n"
     text += f'def Camera "Cam" {{ {back(5)} float fStop = 1\nfloat focusDistance = 4\nCLIP }}'
     clip = "float4[] clippingPlanes = [(0.1, 0.1, -1, -4.2)]"
@@ -188,7 +188,7 @@ def test_projection_matrices_lead_points_to_their_pixels(tmp_path):
     ],
 )
 def test_windows_conform(conform, policy):
-    """A window of 4 x 4 in an image of 3 : 1, by the definitions of UsdRender."""
+    """A 4 x 4 window is fitted to an image of aspect ratio 3 : 1 as UsdRender defines."""
     window = fitted_window((-1, 3, -2, 2), 300, 100, conform)
     expected = {
         "MatchVertically": (-5, 7, -2, 2),

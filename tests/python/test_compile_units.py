@@ -25,7 +25,7 @@ VARIANTS = ROOT / "src" / "wavecomb" / "material" / "description" / "variants.h"
 
 @pytest.fixture(scope="module")
 def units_with(tmp_path_factory: pytest.TempPathFactory) -> dict[str, set[str]]:
-    """Object files by the source files of the core that they include."""
+    """Maps each source file of the core to the object files that include it."""
     ninja = Path(sys.executable).with_name("ninja")
     if not ninja.exists() or not (BUILD / ".ninja_deps").exists():
         not_here("the library was not built by make build")
@@ -51,7 +51,7 @@ def units_with(tmp_path_factory: pytest.TempPathFactory) -> dict[str, set[str]]:
 
 @pytest.fixture(scope="module")
 def units_of(units_with: dict[str, set[str]]) -> dict[str, set[str]]:
-    """Object files by the shading program that they include."""
+    """Maps each shading program to the object files that include it."""
     folder = "material/programs/"
     return {
         name.removeprefix(folder).removesuffix(".h"): units
@@ -61,7 +61,7 @@ def units_of(units_with: dict[str, set[str]]) -> dict[str, set[str]]:
 
 
 def kernel_rows() -> list[tuple[str, str, str, str]]:
-    """Returns the rows of WAVECOMB_KERNELS: kind, set, widths, widths of sanitized builds."""
+    """Returns kind, set, widths and sanitizer widths of each row of WAVECOMB_KERNELS."""
     text = MATRIX.read_text("utf-8")
     rows = re.findall(r"^ *X\((\w+), (\w+), (\w+), (\w+), \"", text, re.MULTILINE)
     assert {row[0] for row in rows} == {"program", "light", "plain"}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Texture inputs connected to primvar readers, interfaces and nodes: one value per object."""
+"""Texture inputs that are connected to nodes with one value per object, such as primvar readers."""
 
 import numpy as np
 import OpenImageIO as oiio
@@ -136,7 +136,7 @@ def test_transforms_by_primvars_and_interfaces(tmp_path):
 
 
 def test_names_of_primvars_by_a_primvar(tmp_path):
-    """A primvar of the mesh names its set of texture coordinates."""
+    """A string primvar of a mesh chooses the primvar that holds its texture coordinates."""
     nodes = reader("string", "set", '"st"')
     meshes = {"Q": 'string primvars:set = "map"', "Bare": ""}
     text = stage("", nodes, meshes=meshes, varname=f"string inputs:varname{FROM_P}")

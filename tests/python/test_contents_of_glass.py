@@ -83,7 +83,7 @@ def refuses_light_paths(renderer: Any) -> bool:
 TINT = {"transmission_depth": 1.0, "transmission_color": tuple(np.exp(-SIGMA))}
 CLEAR = {"transmission_depth": 0.0, "transmission_color": (1, 1, 1)}
 FAR, INSIDE = 3.0, 0.5
-"""Positions of the light: beside the glass and in it."""
+"""Positions of the light: beside the glass and inside the glass."""
 
 
 @pytest.mark.parametrize(
@@ -167,7 +167,7 @@ def test_glass_with_a_graph_elsewhere_is_searched() -> None:
 
 
 def test_absorption_by_a_graph() -> None:
-    """Light paths are refused, and a warning says that objects inside are not dimmed."""
+    """Light paths are refused; a warning says that the glass does not dim objects inside."""
     for stone, lamp in ((True, FAR), (False, INSIDE), (False, FAR)):
         made = scene(graph=graph_of(extinction=1.0), stone=stone, lamp=lamp)
         with pytest.raises(_core.Error, match="absorption comes from a value graph") as error:

@@ -74,7 +74,7 @@ def test_a_light_of_intensity_0_keeps_it_off(tmp_path):
 
 
 def test_sizes_are_those_of_the_world(tmp_path):
-    """Emissive area counts in world space: a scaled panel, and many small instances."""
+    """The area of emissive meshes is measured in world space, after scaling and instancing."""
     text = PANEL.format(name="Panel", half=0.01)
     big = f"""def Xform "Big" {{ float3 xformOp:scale = (100, 1, 100)
         uniform token[] xformOpOrder = ["xformOp:scale"]

@@ -24,13 +24,13 @@ def unit(v):
 
 
 def plane(n):
-    """Returns x to the right and y up over an image, in [-1, 1]."""
+    """Returns the x (right) and y (up) coordinates of an image's pixels, in [-1, 1]."""
     at = (np.arange(n) + 0.5) / n * 2 - 1
     return np.meshgrid(at, -at)
 
 
 def angular():
-    """Returns directions and solid angles of the pixels: sin(t) dt dphi, t = pi r."""
+    """Returns directions and solid angles of the pixels of an angular map."""
     x, y = plane(SIZE)
     r = np.hypot(x, y)
     t = np.pi * r
@@ -39,7 +39,7 @@ def angular():
 
 
 def mirrored_ball():
-    """Returns directions by the law of reflection, seen from +z, and solid angles (4 dA)."""
+    """Returns directions and solid angles (4 dA) of a mirrored-ball image, seen from +z."""
     x, y = plane(SIZE)
     z2 = 1 - x * x - y * y
     n = np.stack([x, y, np.sqrt(np.maximum(z2, 0))], -1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Units of emission: MaterialX's own graphs, and UsdLux, where intensity 1 is 1 nit."""
+"""Units of emission in MaterialX's graphs and in UsdLux, where intensity 1 is 1 nit."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ EMITTED = "float inputs:intensity = 250\ncolor3f inputs:color = (1, 0.5, 0.2)\n"
 
 @pytest.mark.parametrize("normalize", [False, True])
 def test_domes_are_of_the_same_unit(tmp_path: Path, normalize: bool) -> None:
-    """UsdLux: domes ignore inputs:normalize."""
+    """Dome lights ignore inputs:normalize, as UsdLux specifies."""
     light = f'def DomeLight "L" {{\n{EMITTED}bool inputs:normalize = {int(normalize)}\n}}'
     assert np.allclose(mean(tmp_path, light), 250 * COLOUR, rtol=1e-5)
 

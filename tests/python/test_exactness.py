@@ -36,7 +36,7 @@ _plain: dict[Any, wavecomb.Picture] = {}
 
 
 def texture_scene() -> Any:
-    """Returns 24 tiles with four programs before a mirror. Each texture is on two tiles."""
+    """Returns 24 tiles with four shading programs and a mirror. Two tiles share each texture."""
     rng = np.random.default_rng(7)
     builder = wavecomb.SceneBuilder()
     textures = [
@@ -121,11 +121,11 @@ OPENPBR_LOBES: dict[str, dict[str, Any]] = {
         },
     },
 }
-"""Materials by name: each lobe of OpenPBR, and all lobes together."""
+"""Maps names to materials: one for each lobe of OpenPBR, and one with all lobes."""
 
 
 def openpbr_scene() -> Any:
-    """Returns a closed box with each of ``OPENPBR_LOBES``, side by side before a wall."""
+    """Returns closed boxes in front of a wall, one for each of ``OPENPBR_LOBES``."""
     builder = wavecomb.SceneBuilder()
     corners = np.array(list(itertools.product((-0.5, 0.5), repeat=3)), np.float32)
     faces = [
@@ -210,7 +210,7 @@ def graph_scene() -> Any:
 
 @pytest.fixture(scope="session")
 def scene_of(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """Scenes by name, each made once."""
+    """Returns a function that returns a scene by name and creates each scene once."""
 
     def scene(name: str) -> Any:
         if name not in _loaded:
@@ -260,7 +260,7 @@ def plain(
 
 
 def covering_rows(options: dict[str, list[Any]], seed: int = 1) -> list[dict[str, Any]]:
-    """Returns few combinations of options that cover every pair of values of two options."""
+    """Returns a few combinations of options that include every pair of values of two options."""
     rng = random.Random(seed)
     names = list(options)
     left = {
@@ -415,7 +415,7 @@ def test_full_waves_of_64_k(scene: str, scene_of: Any) -> None:
 
 
 class Shuffled(wavecomb.SchedulingPolicy):
-    """A policy with random keys."""
+    """A scheduling policy that gives random sorting keys to queued hits."""
 
     name = "shuffled"
 
@@ -471,7 +471,7 @@ def test_roulettes_are_different_estimates(scene_of: Any) -> None:
 
 @pytest.mark.slow
 def test_cost_aware_from_one_profile_is_reproducible(scene_of: Any) -> None:
-    """Measured costs vary between runs, but not in a profile."""
+    """With costs from a profile, runs are reproducible; measured costs would vary between runs."""
     scene = scene_of("mixed")
     costs = render(scene, (48, 32), 8, policy="adaptive").costs
     settings = {"roulette": "cost-aware", "costs": costs}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stages far from the world origin give the same images as near to it."""
+"""Stages far from the world origin render the same images as stages near the origin."""
 
 from __future__ import annotations
 
@@ -219,7 +219,7 @@ def test_without_a_camera(tmp_path: Path) -> None:
 
 
 def test_the_middle_of_what_is_drawn(tmp_path: Path) -> None:
-    """The middle is that of authored extents, without hidden prims, lights and invalid extents."""
+    """The centre of a stage ignores hidden prims, lights and invalid extents."""
     box = """def Cube "{}" {{
         {}
         double3 xformOp:translate = ({}, 0, 0)

@@ -43,7 +43,7 @@ def one_line(done: subprocess.CompletedProcess[str], *said: str) -> None:
 
 @pytest.mark.slow
 def test_one_image_by_two_workers(stage: Path, tmp_path: Path) -> None:
-    """The image is guided by a field that is trained once for all tiles."""
+    """The image uses a guiding field that is trained once for all tiles."""
     layers = ("crypto", "depth", "position", "light_groups", "error")
     guided = ("--size", "48", "32", "--spp", "96", "--threads", "1", "--guiding", "on")
     words = (*guided, *(word for name in layers for word in ("--aov", name)), "--png")
@@ -115,7 +115,7 @@ def test_a_stage_that_changed_is_rendered_again(stage: Path, tmp_path: Path) -> 
 
 @pytest.mark.slow
 def test_tiles_by_another_queue(stage: Path, tmp_path: Path) -> None:
-    """One `render --tile` per tile, in any order, then `farm assemble`."""
+    """Renders each tile by `render --tile`, in any order, and runs `farm assemble` at the end."""
     words = (*SMALL, "--aov", "crypto", "--png", tmp_path / "a.##.png", "--frames", "1-2")
     names = ("render", stage, "-o", tmp_path / "a.##.exr", *words)
     for tile in ("3/3", "1/3"):

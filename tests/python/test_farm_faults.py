@@ -307,7 +307,7 @@ class _Client:
 
 
 def test_a_full_disk_on_one_worker(stage: Path, tmp_path: Path) -> None:
-    """The tile goes to another worker. If there is none, the command names the reason."""
+    """The tile goes to another worker. Without another worker, the command names the reason."""
     folder, client = made(stage, tmp_path, 1), _Client()
     run = Run(
         folder, Cluster(client, "--on x"), Outcome(16, 1), show=lambda out: None,

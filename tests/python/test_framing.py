@@ -83,7 +83,7 @@ SHAPES = [sphere, cube, pole, floor, corner, rounded, crowd, drops, z_up]
 
 
 def spans(path, size, **options):
-    """Returns the covered fractions of width and height, and how far they are off centre."""
+    """Returns the covered fractions of width and height, and the offset of the covered centre."""
     picture = wavecomb.render(path, size=size, spp=1, aovs=["depth"], filter="box", **options)
     depth = np.asarray(picture.depth).reshape(size[1], size[0])
     seen = np.isfinite(depth) & (depth > 0) & (depth < 1e9)

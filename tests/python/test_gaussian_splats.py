@@ -235,7 +235,7 @@ def test_colours_of_captures_are_decoded() -> None:
 
 
 def sidak(tests: int, level: float = 1e-4) -> float:
-    """Returns the z limit that any of ``tests`` means exceeds with probability ``level``."""
+    """Returns the limit that the largest of ``tests`` |z| exceeds with probability ``level``."""
     from scipy.stats import norm
 
     return float(norm.isf(0.5 * (1.0 - (1.0 - level) ** (1.0 / tests))))
@@ -387,7 +387,7 @@ def test_one_picture_for_all_schedules(tmp_path: Path) -> None:
 
 
 def test_layers_know_them(tmp_path: Path) -> None:
-    """Splats have a depth and a normal towards the camera, and count as emission."""
+    """Splats have a depth and a normal towards the camera; their light is in the emission layer."""
     path = stage(
         tmp_path, camera(aperture=2.0),
         particles(positions=[(0, 0, 0)], harmonics=np.ones((1, 1, 3)), opacities=[0.9]),

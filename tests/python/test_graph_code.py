@@ -38,7 +38,7 @@ def run(value, at, lanes=1):
 
 
 def check(value, at, rtol=2e-4, atol=2e-4, part=1.0):
-    """Compares a value with NumPy, and packet evaluation with scalar evaluation bit by bit."""
+    """Compares a value with NumPy; packet and scalar evaluation must give the same bits."""
     scalar, packet = run(value, at, 1), run(value, at, 16)
     assert scalar.tobytes() == packet.tobytes()
     expected = evaluate(value, at)
@@ -151,7 +151,7 @@ def test_random_graphs_are_what_numpy_says(seed):
 
 @pytest.mark.parametrize("seed", range(30))
 def test_what_is_folded_is_what_would_be_computed(seed):
-    """A graph with constants folds to the same bits as with inputs of these values."""
+    """Constant folding gives the same bits as evaluation with inputs of the same values."""
     rng = random.Random(1000 + seed)
     at = points(1, seed)
     folding, computing = Expressions(), Expressions()

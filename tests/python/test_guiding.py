@@ -132,7 +132,7 @@ def stopped(cornell: Any) -> dict[str, Any]:
 
 @pytest.mark.slow
 def test_what_was_learned_goes_on_with_a_render(cornell: Any, stopped: dict[str, Any]) -> None:
-    """A resumed render with other threads and lanes uses the stored field and does not train."""
+    """A resumed render with other threads and lanes uses the stored guiding field."""
     way = {"guiding": "on", "spp": 128}
     whole = _core.render(cornell, as_settings(**way))
     again = _core.render(
@@ -153,7 +153,7 @@ def test_what_was_learned_goes_on_with_a_render(cornell: Any, stopped: dict[str,
 
 
 def test_more_samples_are_guided_as_those_before(cornell: Any, stopped: dict[str, Any]) -> None:
-    """A render resumed with more samples keeps the field of the shorter one."""
+    """A render that is resumed with more samples keeps its guiding field."""
     more = _core.render(cornell, as_settings(guiding="on", spp=160), state=stopped)
     learned = more.stats["guiding"]
     assert learned["kept"] and learned["paths"] == pytest.approx(SIZE * SIZE * 128 / 8, rel=0.08)
@@ -319,7 +319,7 @@ def test_auto_learns_only_where_that_is_a_small_share(cornell: Any) -> None:
 
 
 def test_a_limit_of_time_is_taught_for_as_long_as_it_may_be(cornell: Any) -> None:
-    """The first round of training assumes a speed; later rounds use the measured speed."""
+    """The first training round assumes a rendering speed; later rounds use measured speeds."""
     way: dict[str, Any] = {"spp": 2**20, "threads": 2, "guiding": "on", "region": (0, 0, 1, 1)}
     learned = render(cornell, time_limit=3.0, **way).stats["guiding"]
     assert learned["rounds"] == 3
@@ -368,7 +368,7 @@ def floor(albedo: float) -> Any:
 
 
 def test_survival_is_the_probability_of_roulette() -> None:
-    """The survival AOV is min(3 x 0.2, 1) after a bounce off an albedo of 0.2, and 1 for misses."""
+    """The AOV "survival" is min(3 x 0.2, 1) after a bounce off albedo 0.2, and 1 for misses."""
     picture = render(
         floor(0.2), spp=4, filter="box", aovs=("survival",), roulette="throughput", roulette_depth=1
     )
@@ -406,7 +406,7 @@ def test_what_was_learned_can_be_looked_up(cornell: Any) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("weights", ["power", "calibrated"])
 def test_shares_of_lights_are_those_of_the_render(mixed: Any, weights: str) -> None:
-    """Selection by power has the same light probabilities at all points and in the statistics."""
+    """With light selection by power, light probabilities are equal at all points."""
     renderer = _core.Renderer(mixed)
     settings = _core.Settings(
         width=SIZE, height=SIZE, spp=1, light_selection="power", light_weights=weights

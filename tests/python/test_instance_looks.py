@@ -41,7 +41,7 @@ def wear(value, kind="constant"):
 
 
 def roughness(scene):
-    """Returns the roughness of each visible mesh, by x of its first point."""
+    """Returns the roughness of the visible meshes, sorted by x of their first points."""
     out = {}
     for mesh, matrix, material in scene.world_meshes():
         x = float((np.append(mesh["positions"][0], 1) @ matrix)[0])

@@ -18,7 +18,7 @@ WIDE = 4.0
 
 
 def filled(builder: Any, ior: float, roughness: float = 0.0, **layers: Any) -> int:
-    """Returns a material of glass or liquid, or of fog that a mesh bounds if the index is 1."""
+    """Returns a glass or liquid material; an index of 1 gives the fog that a mesh bounds."""
     return int(
         builder.add_material(
             "openpbr",
@@ -69,7 +69,7 @@ def test_a_clear_slab_absorbs_as_it_should() -> None:
 
 
 def test_a_camera_in_fog_knows_where_it_is() -> None:
-    """A camera at 5 is inside of a slab from -2 to 20, and sees only the part below it."""
+    """A camera at z = 5 inside a slab from z = -2 to 20 sees only the part below the camera."""
     builder = wavecomb.SceneBuilder()
     slab(builder, -2.0, 20.0, filled(builder, 1.0, **absorbing(SIGMA)))
     slab(builder, -1.0, 1.0, filled(builder, 1.0, **absorbing(2 * SIGMA)))
@@ -83,9 +83,7 @@ def test_a_camera_in_fog_knows_where_it_is() -> None:
     [((1.0, 0.0), (1.0, 1.0)), ((0.0, 0.0), (0.75, 1.25)), ((-1.0, 2.0), (0.75, 1.25))],
 )
 def test_where_two_overlap_the_higher_priority_is_there(priorities: Any, lengths: Any) -> None:
-    """Where two slabs overlap, the one with the higher priority counts, or else the last entered
-    one.
-    """
+    """Where slabs overlap, the higher priority determines the medium, or else the last entry."""
     builder = wavecomb.SceneBuilder()
     other = SIGMA[::-1]
     for (low, high), sigma, priority in zip(
@@ -157,7 +155,7 @@ def test_fog_dims_the_rays_that_see_it(rays: dict[str, bool], passes: float) -> 
     ],
 )
 def test_fog_around_a_floor_dims_the_rays_that_see_it(rays: dict[str, bool], passes: float) -> None:
-    """Camera rays and shadow rays each pass 1 unit of fog, unless it is invisible to them."""
+    """Camera rays and shadow rays each pass 1 unit of fog, unless the fog is invisible to them."""
     pixels = []
     for sigma in (np.zeros(3) + 1e-6, SIGMA):
         builder = wavecomb.SceneBuilder()
@@ -219,7 +217,7 @@ def test_what_casts_no_shadow_neither_stops_nor_dims_light(ior: float, how: str)
 
 
 def test_shadow_rays_meet_bounds_close_behind_a_cut_out() -> None:
-    """Light that passes a half-present card close below a slab is still dimmed by the slab."""
+    """Light that passes a card of opacity 1/2 close below a slab is still dimmed by the slab."""
     pixels = []
     for sigma in (np.zeros(3) + 1e-6, SIGMA):
         builder = wavecomb.SceneBuilder()
@@ -514,7 +512,7 @@ def test_what_volumes_miss_in_cloudy_glass_is_said(tmp_path: Path) -> None:
 
 
 def stone_in_glass(layers: dict[str, Any], low: float = -1.5) -> Any:
-    """Returns an emissive block from ``low``, in or below a block of glass from -2 to 1."""
+    """Returns glass from z = -2 to 1 and an emissive block whose bottom is at z = ``low``."""
     builder = wavecomb.SceneBuilder()
     slab(builder, -2.0, 1.0, filled(builder, 1.5, **layers))
     glow = builder.add_material("emissive", emission=(1.0, 2.0, 3.0))
@@ -523,7 +521,7 @@ def stone_in_glass(layers: dict[str, Any], low: float = -1.5) -> Any:
 
 
 def test_what_lies_in_absorbing_glass_is_dimmed() -> None:
-    """The light is dimmed by exp(-sigma t), although paths hit the block and not the glass."""
+    """Light from a block inside the glass is dimmed by exp(-sigma t) on its way to the surface."""
     clear = seen_from_above(stone_in_glass({}), spp=16)
     tinted = seen_from_above(stone_in_glass(absorbing(SIGMA)), spp=16)
     assert clear.mean() > 0.5
@@ -546,7 +544,7 @@ def lit_stone(seed: int, as_volume: bool) -> Any:
 
 
 def test_a_stone_in_absorbing_glass_is_one_in_an_absorbing_volume() -> None:
-    """Absorption counts on segments that end at the stone instead of at the glass."""
+    """Absorption also applies to ray segments that end at an object inside the glass."""
     mesh = np.array([lit_stone(seed, False) for seed in range(8)])
     volume = np.array([lit_stone(seed, True) for seed in range(8, 16)])
     error = np.sqrt(mesh.var(axis=0, ddof=1) / 8 + volume.var(axis=0, ddof=1) / 8)
@@ -571,13 +569,13 @@ def refuses_light_paths(builder: Any) -> bool:
 
 @pytest.mark.parametrize(("low", "refused"), [(-1.5, True), (-2.5, False), (-2.2, True)])
 def test_light_paths_do_not_go_with_objects_in_absorbing_glass(low: float, refused: bool) -> None:
-    """Objects inside or reaching into the glass are refused, the one below it is not."""
+    """Light paths are refused if an object is inside the glass or reaches into the glass."""
     assert refuses_light_paths(stone_in_glass(absorbing(SIGMA), low)) == refused
     assert not refuses_light_paths(stone_in_glass({}, low))
 
 
 def glass_ball(builder: Any, inwards: bool = False, radius: float = 1.0, **layers: Any) -> int:
-    """Adds a ball of absorbing glass around the origin, or a hollow with ``inwards``."""
+    """Adds a ball of absorbing glass around the origin; ``inwards`` flips its faces."""
     mesh = ball(radius, 24)
     faces = mesh.faces.astype(np.uint32)
     material = filled(builder, 1.5, **{**absorbing(SIGMA), **layers})
@@ -618,7 +616,7 @@ def test_what_is_in_a_hollow_is_not_in_the_glass(hollow: bool, refused: bool) ->
     ("kind", "refused"), [("dome", False), ("distant", False), ("sphere", True)]
 )
 def test_lights_in_absorbing_glass(kind: str, refused: bool) -> None:
-    """Lights without a position are in no glass."""
+    """Lights without a position are never inside glass."""
     builder = wavecomb.SceneBuilder()
     builder.add_to_group(0, glass_ball(builder))
     builder.add_light(kind, np.eye(4), color=(1, 1, 1), **({"radius": 0.1} if refused else {}))

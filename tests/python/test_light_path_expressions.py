@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Light path expressions: their light, partitions that add up, and how to request them."""
+"""Light path expressions: light in each layer, partitions that add up, and request syntax."""
 
 from __future__ import annotations
 
@@ -171,7 +171,7 @@ def Camera "Cam" { float focalLength = 20
 
 
 def test_multipliers_go_to_the_lobe_that_they_are_of(tmp_path: Path) -> None:
-    """Multipliers also apply to light found by bounces, as half of the sky on plastic is."""
+    """Multipliers also apply to light that bounces find, such as sky light on plastic."""
     asked = {"diffuse": "C<RD>B", "glossy": "C<RG>B", "seen": "CB"}
     found = {}
     for diffuse in (1, 0.25):

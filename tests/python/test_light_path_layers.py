@@ -113,7 +113,7 @@ def test_a_layer_is_the_same_alone(stages: Any) -> None:
 
 
 def test_light_paths_bring_what_expressions_say(stages: Any) -> None:
-    """A caustic has a diffuse last vertex, and only glass or gold before it."""
+    """A caustic has a diffuse last vertex, and only glass or gold vertices before."""
     path = ["techniques", "lpe:caustic=CD[GS]+L", "lpe:rest=C[^D].*"]
     found = render(stages["caustics"], spp=16, aovs=path, light_aim="on")
     caustic = found.aovs["lpe_caustic"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Light paths with media: refused in one line, or not used by auto; nothing gets darker."""
+"""Light paths are refused in scenes with media, or avoided by "auto"; no image is darker."""
 
 from __future__ import annotations
 

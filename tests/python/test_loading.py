@@ -180,7 +180,7 @@ def test_shapes_of_equal_size_share_their_arrays() -> None:
 
 
 def big_mesh(path: Path, side: int, smooth: bool) -> None:
-    """Writes a wavy square of 2 side^2 triangles. ``smooth``: quads whose normals are computed."""
+    """Writes a wavy square of 2 side^2 triangles, or of subdivided quads if ``smooth`` is set."""
     u = np.linspace(-1, 1, side + 1, dtype=np.float32)
     x, z = np.meshgrid(u, u)
     points = np.stack([x, 0.1 * np.sin(9 * x) * np.cos(7 * z), z], -1).reshape(-1, 3)
@@ -236,7 +236,7 @@ print(json.dumps({"imports": imports, "load": after, "peak": memory("VmHWM"),
 @pytest.mark.slow
 @pytest.mark.parametrize("smooth", [False, True])
 def test_memory_and_threads_of_a_big_mesh(tmp_path: Path, smooth: bool) -> None:
-    """Peak memory is at most 1.5 times arrays and BVH, without copies; all threads build."""
+    """Peak memory is at most 1.5 times the arrays and the BVH, whose build uses all threads."""
     pytest.importorskip("wavecomb._core")
     stage = tmp_path / "big.usdc"
     big_mesh(stage, 900, smooth)
@@ -281,8 +281,7 @@ print((memory("VmHWM") - before) / count)
 
 @LINUX
 def test_instances_are_not_held_twice_while_a_scene_is_made() -> None:
-    """An instance needs about 150 bytes. The builder frees
-    its copy of the instances before the scene's records are made."""
+    """An instance needs about 150 bytes, since the builder frees its copies early."""
     pytest.importorskip("wavecomb._core")
     run = subprocess.run([sys.executable, "-c", MANY], capture_output=True, text=True, check=True)
     assert 100 < float(run.stdout) < 260, run.stdout

@@ -23,7 +23,7 @@ MOST = 23
 """Maximum number of Python and C++ files through which a material passes."""
 
 NOT_ON_THE_PATH = {"isa.py", "usd/stage/report.py"}
-"""Files that do not count: choice of the native library, and messages about the stage."""
+"""Files that are not counted, which choose the native library or report messages."""
 
 NATIVE = (
     "bindings/materials.cpp",

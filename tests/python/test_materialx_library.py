@@ -94,7 +94,7 @@ def test_all_nodes_are_read_or_named_with_a_reason():
 
 @pytest.mark.parametrize("category", sorted(by_category("primitive", "graph")))
 def test_no_node_that_is_read_says_anything(category):
-    """The first and last type of each node compiles without warnings to the right width."""
+    """The first and last type of each node compile to the right width without warnings."""
     variants = by_category("primitive", "graph")[category]
     for identifier in {variants[0], variants[-1]}:
         node = Node(identifier).feed_at_random()

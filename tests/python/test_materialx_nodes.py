@@ -115,7 +115,7 @@ def test_range_clamps_only_when_told():
 
 
 def test_fractal2d_is_a_sum_of_flat_noise():
-    """The noise has two dimensions; it is no slice of noise in three dimensions."""
+    """The node fractal2d uses two-dimensional noise, not a slice of three-dimensional noise."""
     node = Node("ND_fractal2d_vector3")
     node.give(octaves=4, lacunarity="2.5", diminish="0.4", amplitude="1, 2, 3")
     total = sum(

@@ -48,7 +48,7 @@ def refused(done: subprocess.CompletedProcess[str], *said: str) -> None:
 def test_checks_that_need_no_stage_come_first(
     tmp_path: Path, options: tuple[str, ...], said: str
 ) -> None:
-    """The stage does not exist, so a check after loading would report the missing stage."""
+    """Options are checked before loading, so the missing stage is not reported instead."""
     output = () if "-o" in options else ("-o", "a.exr")
     for command in (("render",), ("farm", "submit")):
         done = forks.wavecomb(*command, "gone.usda", *output, *options, cwd=tmp_path)

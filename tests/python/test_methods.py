@@ -79,7 +79,7 @@ def test_every_paper_that_is_named_is_on_the_page() -> None:
 
 
 def test_citations_are_found() -> None:
-    """Checks the pattern: names, pairs of authors, lists, titles between name and year."""
+    """The citation pattern finds single authors, pairs, lists, and titles between name and year."""
     there = citations()
     assert len(there) > 40
     for key in (("Walter", "2007"), ("Veach", "1997"), ("Dammertz", "2010"), ("Vose", "1991"),

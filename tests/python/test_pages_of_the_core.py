@@ -64,7 +64,7 @@ def test_files_exist(page: str) -> None:
 
 @pytest.mark.parametrize("page", PAGES)
 def test_names_exist(page: str) -> None:
-    """Each code span that is an identifier, qualified or called or not, names something."""
+    """Each identifier in a code span of a page exists in the sources."""
     text = sources() + python_sources()
     for word in code(page):
         name = word.removesuffix("()")

@@ -147,7 +147,7 @@ def test_what_metrics_refuse() -> None:
 
 
 def noisy_pair(seed: int, shift: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns an image with noise of known variance, and its mean, off by ``shift``."""
+    """Returns a noisy image, its mean without ``shift``, and the variance of its noise."""
     rng = RNG(seed)
     mean = rng.random((40, 48, 3)) + 0.5
     variance = (0.05 * mean) ** 2

@@ -216,7 +216,7 @@ def blender(folder: Path, name: str) -> dict[str, str]:
 def test_blender_imports_nothing_from_folders_of_the_user(place: Place, name: str) -> None:
     """Blender imports nothing from the working folder or the folder of the .blend file.
 
-    Its process inherits no descriptors and has a separate process group.
+    Blender's process inherits no descriptors and has a separate process group.
     """
     variables = blender(place.safe, name)
     file, out = place.shot / "a.blend", place.safe / "a.exr"
@@ -296,7 +296,7 @@ def test_windows_import_nothing_from_the_working_folder(place: Place) -> None:
 
 
 def test_a_process_finds_the_package_that_lies_in_the_working_folder() -> None:
-    """As in a checkout: the package is found although the folder is not on the module path."""
+    """The package is found in the working folder, which is not on the module path."""
     words = processes.command("-c", "import wavecomb, sys; print(wavecomb.__file__, sys.path)")
     done = subprocess.run(
         words, cwd=PACKAGE.parent, capture_output=True, text=True, check=True, timeout=60

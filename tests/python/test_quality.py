@@ -33,7 +33,7 @@ def render(scene: Any, **settings: Any) -> Any:
 
 @pytest.fixture(scope="module")
 def default(caustics: Any) -> Any:
-    """A part of an image by the defaults."""
+    """Renders a part of an image with default settings."""
     return render(caustics)
 
 
@@ -105,7 +105,7 @@ def test_a_resumed_render_keeps_its_decision(caustics: Any, default: Any) -> Non
 
 
 def test_more_samples_do_not_change_the_transport_of_a_render(caustics: Any) -> None:
-    """A render with too few samples for light paths stays without them when resumed with more."""
+    """A render that had too few samples for light paths does not use them when it is resumed."""
     short = {**PART, "spp": 4}
     stop = StopAt(1)
     _core.render(caustics, _core.Settings(**short), watcher=stop, interval=0.001)
@@ -125,7 +125,7 @@ def test_short_time_limits_leave_no_time_for_pilots(caustics: Any) -> None:
 
 @pytest.mark.slow
 def test_late_pilots_give_up(caustics: Any) -> None:
-    """For 64 threads, more samples are expected than this machine renders in half a second."""
+    """Pilot renders for 64 threads take too much of 0.5 s, so light paths are not used."""
     stats = render(caustics, time_limit=0.5, threads=64).stats
     assert stats["transport"]["chosen"] == "path"
     assert "too much of the time limit" in stats["transport"]["why"]

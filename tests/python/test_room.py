@@ -116,7 +116,7 @@ def test_images_tile(name: str) -> None:
     "look", ["Plaster", "Planks", "Walnut", "Wool", "Linen", "Twill", "Leather", "Marble"]
 )
 def test_texture_coordinates_are_metres(stage: Usd.Stage, look: str) -> None:
-    """Texture coordinates are in metres, but slightly stretched on folded or rounded parts."""
+    """Texture coordinates are in metres; they are slightly stretched on folded or rounded parts."""
     areas, scales = [], []
     for mesh in meshes(stage):
         # Skip small meshes: the floor of the partition's reveal, and rims of pillows.

@@ -67,9 +67,7 @@ def place() -> Iterator[Path]:
 
 
 def child(place: Path, code: str, *, reads: str = "", status: int = 0) -> dict[str, str]:
-    """Runs code in the sandbox and returns its attempts. The result has the outcome of each
-    attempt.
-    """
+    """Runs code in the sandbox; returns the outcome of each attempt that the code records."""
     given = CHILD + code + "\nprint(json.dumps(tried))"
     done = subprocess.run(
         [sys.executable, "-c", PARENT, str(place), reads, given],

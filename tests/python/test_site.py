@@ -129,8 +129,9 @@ PARTS = {
 WITHOUT = {"faq": {"limits"}, "glossary": {"limits"}, "ide": {"image"},
            "window-compare": {"image"}, "window-scene": {"image"},
            "window-scheduling": {"image"}}  # fmt: skip
-"""Parts that a page may lack. docs/decisions/page-parts.md has the reasons, except for pages
-about the window, which have no images yet."""
+"""Page parts that pages may omit. docs/decisions/page-parts.md has the reasons, except for pages
+about the window, which have no images yet.
+"""
 
 
 @pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=lambda page: page.stem)

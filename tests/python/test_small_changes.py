@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files to edit for a program, a light, a setting, an AOV or a transport, and that they compile.
+"""Additions of a program, a light, a setting, an AOV and a transport edit few files and compile.
 
-Each example edits a copy of the sources as the pages of docs/ describe. Lists and tables made by
-hand anywhere else would make the number of files grow, or the edited tree not compile.
+Each example edits a copy of the sources as the pages of docs/ describe. A hand-written list
+anywhere else would increase the number of files or break compilation.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parents[2]
 CORE = "src/wavecomb"
 
 Change = dict[str, tuple[str, ...]]
-"""File -> texts in it, each followed by its replacement; "" for a new file."""
+"""Maps a file to texts and their replacements in turn. The text of a new file is ""."""
 
 
 def header(name: str) -> str:
@@ -29,7 +29,7 @@ def header(name: str) -> str:
 
 
 def last_row(file: str, table: str, more: str) -> tuple[str, str]:
-    """Returns the end of a table in a macro, and that end with a row after it."""
+    """Returns the last row of a macro table, and the same row followed by an additional row."""
     text = (ROOT / CORE / file).read_text("utf-8")
     start = text.index(f"#define {table}(")
     lines = text[start:].splitlines()

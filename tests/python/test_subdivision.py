@@ -54,7 +54,7 @@ def nearest(made, point):
 
 
 def neighbours(faces, v):
-    """Returns the points that share an edge with v, and those across its quads."""
+    """Returns the points that share an edge with v, and the points opposite v in its quads."""
     edges, across = set(), []
     for face in faces:
         if v in face:
@@ -230,7 +230,7 @@ def test_without_boundary_interpolation_the_outer_faces_go():
 
 
 def smoothed(*values):
-    """Returns the limit position on a crease, from a neighbour, the point, the other neighbour."""
+    """Returns the limit position of a crease point, which is the second of three values."""
     a, b, c = (np.asarray(value, float) for value in values)
     return (a + 4 * b + c) / 6
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The beauty by technique: bounces, light samples, light paths."""
+"""Layers that split the beauty by sampling technique: bounces, light samples, light paths."""
 
 from __future__ import annotations
 

@@ -68,7 +68,7 @@ def test_a_set_that_is_not_there_leaves_the_other(tmp_path):
 
 
 def test_parts_of_a_mesh_have_their_own(tmp_path):
-    """Materials of subsets that use other sets of texture coordinates than the first."""
+    """Face subsets whose materials use different sets of texture coordinates."""
     text = stage(tmp_path, "st", "st")
     other = stage(tmp_path, "UVMap2", "UVMap2").split("def Mesh")[0]
     other = other.replace('"Mat"', '"Two"').replace("</Mat", "</Two")

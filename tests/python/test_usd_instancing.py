@@ -37,7 +37,7 @@ def origins(scene):
 
 
 def names(scene):
-    """Returns the material name of each visible mesh, by x of its first point."""
+    """Returns the material names of the visible meshes, sorted by x of their first points."""
     out = {}
     for mesh, matrix, material in scene.world_meshes():
         x = float((np.append(mesh["positions"][0], 1) @ matrix)[0])

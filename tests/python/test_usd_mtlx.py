@@ -386,7 +386,7 @@ def test_as_openusd_reads_it(name: str) -> None:
 
 
 def test_materialx_counts_before_the_preview(tmp_path: Path) -> None:
-    """A material with both networks uses MaterialX, without a message about unconnected inputs."""
+    """MaterialX takes precedence over UsdPreviewSurface, without a message about unused inputs."""
     write(tmp_path, "gold.mtlx", GOLD)
     file = write(
         tmp_path,

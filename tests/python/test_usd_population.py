@@ -257,7 +257,7 @@ def test_bad_payloads_are_named(tmp_path, payloads, says):
 
 @pytest.mark.parametrize("units", [0.01, 1.0])
 def test_units_change_nothing(tmp_path: Path, units):
-    """Lengths are in the units of the stage, whatever these are."""
+    """All lengths are in stage units, so metersPerUnit has no effect."""
     text = f"""#usda 1.0
 (metersPerUnit = {units})
 def Mesh "M" {{ {QUAD} }}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Bad input ends in one clear line, never in a crash or in a silently wrong image."""
+"""Bad input causes one clear error line, never a crash or a silently wrong image."""
 
 import subprocess
 import sys

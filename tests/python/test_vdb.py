@@ -285,7 +285,7 @@ def test_a_thousand_million_voxels_are_one_line(
 
 @pytest.mark.slow
 def test_the_memory_limit_holds(tmp_path: Path) -> None:
-    """The command sets the limit of the process that reads the file."""
+    """The memory limit of the command applies to the process that reads the file."""
     huge(tmp_path / "a.vdb")
     stage = tmp_path / "s.usda"
     stage.write_text(

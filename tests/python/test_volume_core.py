@@ -56,7 +56,7 @@ def test_an_absorbing_box_lets_through_the_exponential() -> None:
 
 @pytest.mark.parametrize("kind", [np.float32, np.float16])
 def test_a_grid_that_grows_along_the_ray(kind: Any) -> None:
-    """The density is 2 z between 0 and 1, and falls to 0 within a voxel: exp(-optical depth)."""
+    """The transmittance is exp(-optical depth) for a density of 2 z between z = 0 and 1."""
     voxels = np.zeros((16, 16, 16), kind)
     voxels[:] = np.linspace(0.0, 2.0, 16).astype(kind)
     builder = _core.SceneBuilder()

@@ -76,7 +76,7 @@ VIEW = (
     (-0.397505939, 0.244264171, 0.884490848, 0.0), (-63.5111198, 138.246094, 375.207275, 1.0),
 )  # fmt: skip
 FIELD_OF_VIEW = 54.4322243
-"""Field of view in degrees of the camera in Arnold's test.ass, to which the sky is invisible."""
+"""Field of view, in degrees, of the camera in Arnold's test.ass, which does not see the sky."""
 
 
 def smoke_of_arnold(folder: Path, scatter: float) -> Any:

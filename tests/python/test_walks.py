@@ -197,7 +197,7 @@ def test_a_black_sphere_lets_through_what_misses_all_collisions() -> None:
 
 
 def scene(bounces_see_all: bool = True) -> Any:
-    """Returns a box of skin with a coat, one inside it, a floor, a light and a sky."""
+    """Returns a box of coated skin with a second box inside, a floor, a light and a sky."""
     builder = wavecomb.SceneBuilder()
     values = {
         "subsurface_color": (0.9, 0.5, 0.3),
@@ -271,7 +271,7 @@ def test_guided_bounces_keep_the_mean() -> None:
 
 
 def test_lanes_stay_full() -> None:
-    """Random walks that end leave their lanes to others."""
+    """When a random walk ends, another walk takes its SIMD lane."""
     counts = wavecomb.render(scene(), size=(160, 120), spp=4).stats["counts"]
     assert counts["walk_steps"] > 0.9 * counts["walk_lanes"]
 
@@ -311,7 +311,7 @@ def test_what_comes_from_below_has_a_layer() -> None:
 
 @pytest.mark.parametrize("instanced", [False, True])
 def test_what_lies_within_is_not_met(instanced: bool) -> None:
-    """Strands and a mesh inside another body change nothing, whichever a ray meets first."""
+    """Strands and a mesh inside a subsurface body do not change the image."""
 
     def picture(filled: bool) -> Any:
         builder = wavecomb.SceneBuilder()

@@ -5,15 +5,15 @@
 `ref_var.exr` the variance of that mean for each pixel and channel. Only tools/update_references
 writes the reference images.
 
-An image is tested as independent renders as well ("batches" with one seed each), so nothing is
-assumed about the noise within a render:
+The tested image also consists of independent renders ("batches" with one seed each), so nothing is
+assumed about the noise within a render. There are three tests:
 
 - pixels: z = (a - ref) / sqrt(var_a + var_ref), Welch's t; at least 99.75 % of the values must pass
   at the level 0.01 with Sidak's correction;
 - blocks of 8 x 8 pixels, with an eighth of the noise: all must pass, with the same correction;
-- the mean of the whole image for each channel, at a level of 0.001, which finds a small bias.
+- image mean: the mean of each channel must pass at a level of 0.001, which finds a small bias.
 
-Differences below TOLERANCE of the value are ignored, for pixels without noise.
+Differences below the fraction TOLERANCE of the value are ignored, since some pixels have no noise.
 """
 
 from __future__ import annotations

@@ -36,7 +36,7 @@ from scipy import stats  # noqa: E402
 
 SIZE, BLOCK, BATCHES = 12, 4, 10
 SPP, SAMPLES, DIRECTIONS = 96, 12, 4
-"""Samples per batch: Wavecomb's, the naive integrator's, and its directions at the first vertex."""
+"""Samples per batch of both integrators, and directions of the naive one at the first vertex."""
 SUSPICION = 3.3
 MORE = (12, 60)
 LEVEL = 0.01

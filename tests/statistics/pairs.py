@@ -41,7 +41,7 @@ from random_scenes import RandomScene, make_scene  # noqa: E402
 SPP = 64
 """Samples per pixel of a batch."""
 TRAINING_SPP = 1024
-"""Samples of the render that trains the guiding field: fewer train nothing at this size."""
+"""Samples of the render that trains the guiding field; fewer would not suffice for training."""
 PLAIN: dict[str, Any] = {
     "transport": "path",
     "guiding": "off",
@@ -243,7 +243,7 @@ class Renders:
         return bool(visible[0].any()) or not same
 
     def tolerance(self, variant: Variant) -> float:
-        """Relative difference of means that the documentation allows for."""
+        """Relative difference of means that the documentation permits for a variant."""
         if variant.settings.get("transport", "path") == "path":
             return 0.0
         if "merge_radius" in variant.settings:

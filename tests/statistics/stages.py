@@ -254,7 +254,7 @@ def turned(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Array:
 def latlong_directions(height: int) -> Array:
     """Directions of the pixels of a latlong image in OpenEXR's convention, (h, 2 h, 3).
 
-    The centre points along +z, s = 1/4 along +x, the top row up.
+    The image centre points along +z, the column at s = 1/4 along +x, and the top row up.
     """
     t = (np.arange(height) + 0.5) / height
     s = (np.arange(2 * height) + 0.5) / (2 * height)

@@ -126,7 +126,7 @@ PROGRAMS: dict[str, dict[str, Any]] = {
 @pytest.mark.parametrize("roughness", [0.0, 0.1, 0.3, 0.6, 1.0])
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_no_program_makes_energy(shot: Any, program: str, roughness: float) -> None:
-    """White furnace: the radiance is at most 1, and not below the known loss of the program."""
+    """In a white furnace, the radiance is between 1 minus the program's known loss and 1."""
     body = material("M", program, roughness=roughness, **PROGRAMS[program])
     depth = 32 if program == "dielectric" else 1
     picture = shot(AT_BALL, WHITE, body, sphere("B", "M"), spp=512, size=16, max_depth=depth)

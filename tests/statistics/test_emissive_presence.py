@@ -243,7 +243,7 @@ def test_bounces_and_light_samples_alone(shot: Shot, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("roughness", [0.2, 0.6])
 def test_on_gloss(shot: Shot, roughness: float) -> None:
-    """A half-present light has half of its effect on glossy floors, with MIS of both techniques."""
+    """A light of opacity 1/2 contributes half of its radiance to glossy floors, with MIS."""
     metal = material("M", "metal", diffuseColor=(0.9, 0.9, 0.9), roughness=roughness)
     scene: dict[str, Any] = {
         "view": camera((0, 1, 2), (0, 0, 1), half=0.02, lens=SHUTTER),

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Hair compared with Mitsuba 3's `hair`: a fibre, a bundle and a head agree within noise.
 
-A fibre and a bundle are straight and end outside the image, because the renderers' ends differ by
-design. The hairs of the head end inside the image and taper to a tenth of their radius; round ends
-of full width would change the image by 0.15 %.
+A fibre and a bundle are straight and end outside the image, because the two renderers model fibre
+ends differently. The hairs of the head end inside the image and taper to a tenth of their radius;
+round ends of full width would change the image by 0.15 %.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def line(a: Any, b: Any) -> Any:
 
 
 def stage(kind: str, roughness: tuple[float, float]) -> Any:
-    """Fibres between a front light and a back light under a dim sky; those of a head on a ball."""
+    """Fibres between a front and a back light under a dim sky; kind "head" adds them to a ball."""
     from recording import RecordingBuilder
 
     builder = RecordingBuilder()

@@ -187,7 +187,7 @@ def test_several_lights(check: Check, recorded: Any, tmp_path: Path) -> None:
 
 
 def test_emissive_mesh(check: Check, recorded: Any) -> None:
-    """Uses a closed emitter, because Wavecomb's emit to both sides and Mitsuba's only outwards."""
+    """Uses a closed emitter, since emitters have two sides in Wavecomb and one in Mitsuba."""
     lamp = material("Lamp", "emissive", emissiveColor=(5, 7, 3))
     scene = recorded(
         VIEW, GREY, BLUE, lamp, ground("Grey"), sphere("Ball", "Blue", (0, 1, 0)),
@@ -210,8 +210,8 @@ def test_glass(check: Check, recorded: Any, tmp_path: Path, smooth: bool) -> Non
 def test_gold(check: Check, recorded: Any, tmp_path: Path, roughness: float) -> None:
     """A conductor with measured index.
 
-    Mitsuba's masking and shadowing are separable, ours are height-correlated; and Mitsuba omits
-    multiple scattering, which we compensate. The differences between the models are invisible up to
+    Mitsuba's masking and shadowing are separable; Wavecomb's are height-correlated. Only Wavecomb
+    compensates for multiple scattering. The differences between the models are invisible up to
     alpha 0.04.
     """
     dome = light("Dome", texture=write_sky(tmp_path))
@@ -338,8 +338,8 @@ def test_texture(check: Check, recorded: Any, tmp_path: Path) -> None:
 def test_instances_and_smooth_normals(check: Check, recorded: Any, tmp_path: Path) -> None:
     """Smooth normals under a transform that stretches and rotates.
 
-    Our rays start from the smooth surface that the vertex normals imply, to avoid the shadow
-    terminator; with 64 rings the difference is invisible.
+    Wavecomb's rays start on the smooth surface that the vertex normals imply, to avoid shadow
+    terminator artefacts. With 64 rings, this difference to Mitsuba is invisible.
     """
     dome = light("Dome", texture=write_sky(tmp_path))
     stretch = np.diag([1.3, 0.6, 0.8, 1.0]) @ turned(20, 40, 10) @ moved(0, 1, 0)

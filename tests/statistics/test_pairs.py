@@ -173,7 +173,7 @@ def dimmed(image: Any) -> Any:
 
 
 def test_rare_paths_are_open_and_no_fault() -> None:
-    """A block expects 0.2 to 3 paths: Welch's t often calls none of them a fault, wrongly."""
+    """With 0.2 to 3 expected paths per block, no difference counts as a sure fault."""
     open_ones = 0
     for seed in range(40):
         for paths in (0.2, 0.8, 2.0):

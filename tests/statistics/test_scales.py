@@ -66,7 +66,7 @@ def test_scales(tmp_path: Path, beauty: Any) -> None:
 
 @pytest.mark.slow
 def test_far_from_the_origin(tmp_path: Path, beauty: Any) -> None:
-    """A thousand units from the origin floats resolve 6e-5; nothing intersects itself."""
+    """A thousand units from the origin, floats resolve 6e-5 units; no surface shadows itself."""
     near, far = scaled(tmp_path, 1.0), scaled(tmp_path, 1.0, (1000.0, 0.0, -1000.0))
     b = batches(lambda seed: beauty(near, 64, 64, seed=seed, max_depth=5), 8, first_seed=700)
     a = batches(lambda seed: beauty(far, 64, 64, seed=seed, max_depth=5), 8)

@@ -94,8 +94,7 @@ def exact(height: float) -> float:
 def test_one_mean(
     tmp_path: Path, beauty: Any, technique: str, height: float, texture_filter: str
 ) -> None:
-    """Test light samples with bounces, which have small weights far away; almost only bounces,
-    because a light without effect takes most light samples; and light paths."""
+    """Light samples with bounces, almost only bounces, and light paths have the same mean."""
     write_image(tmp_path / "stripes.exr", stripes(), "float")
     prims = [
         camera((0, 0.2, 0.001), (0, 0, 0), half=0.02),

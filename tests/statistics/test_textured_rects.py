@@ -35,7 +35,7 @@ def spots() -> NDArray[np.float32]:
 
 
 def radiance(image: Array, s: Array, t: Array) -> Array:
-    """Bilinear lookup, clamped, t up."""
+    """Looks up the image bilinearly with clamped coordinates; t points up."""
     height, width, _ = image.shape
     x, y = s * width - 0.5, (1 - t) * height - 0.5
     i, j = np.floor(x).astype(int), np.floor(y).astype(int)

@@ -82,10 +82,9 @@ def rel_mse(picture: Any, reference: Any) -> float:
 
 @pytest.mark.slow
 def test_owen_sobol_converges_faster(cornell: Any, beauty: Any, fewer: int) -> None:
-    """Independent noise has at least 1.3 times the error at 16 samples, and 1.9 times at 256.
+    """Independent sampling has 1.3 times the error of Sobol at 16 samples, and 1.9 times at 256.
 
-    Measured at 8 bounces: 1.6 and 2.4 (4.4 and 7.0 with direct light only). Independent samples
-    need this many times more samples for the same error.
+    The measured ratios at 8 bounces are 1.6 and 2.4. With direct light only, they are 4.4 and 7.0.
     """
     reference = beauty(cornell, 32, 8192 // fewer, seed=900, sampler="sobol")
     gain = {}

@@ -35,7 +35,7 @@ def files(pictures: tuple[str, ...]) -> list[str]:
 @needs("wavecomb._core")
 @needs_asset(*files(FEW))
 def test_a_few_pictures(tmp_path: Path) -> None:
-    """Small images: a block of 16 pixels of 64 corresponds to 64 pixels of the reference."""
+    """Images 64 pixels wide pass; a block of 16 pixels corresponds to 64 reference pixels."""
     options = ["--size", "64", "--spp", "64", "-o", str(tmp_path)]
     assert usdlux.main([*FEW, *options]) == 0
 

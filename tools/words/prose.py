@@ -28,7 +28,7 @@ COMMENT_HASH = re.compile(r"^\s*#(?!!)[#:]*(.*)$")
 TRAILING_HASH = re.compile(r"^(.*?\S)\s{2,}# (.*)$")
 STRINGS = r'(?:[fr]?"(?:[^"\\\n]|\\.)*"\s*)+'
 HELP_POSITIONS = {"option": 2, "_row": 1, "Row": 0}
-"""Names of Python functions -> position of the help text in their arguments."""
+"""Maps names of Python functions to the position of the help text in their arguments."""
 LITERALS = re.compile(STRINGS)
 NO_PROSE = re.compile(
     r"SPDX-License|^\s*(?:noqa|fmt:|type:|clang-format|pragma|namespace )|^[-=\s]*$|^-{3,} "

@@ -134,5 +134,5 @@ def wait_final(qtbot, session, timeout=20000):
 
 @pytest.fixture
 def final(qtbot):
-    """``wait_final`` as a function of a session, without the argument ``qtbot``."""
+    """Returns ``wait_final`` as a function that needs only a session and no ``qtbot``."""
     return lambda session, timeout=20000: wait_final(qtbot, session, timeout)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The window operated like a user would: a real process and X server, mouse and keyboard.
+"""Operates the window as a user would, by mouse and keyboard on an X server.
 
 `make test-long` runs ten very different stages. WAVECOMB_SCREENSHOTS names a folder for
 screenshots.

@@ -232,7 +232,7 @@ def test_without_a_stage_keeping_says_so(qtbot, window):
 
 @pytest.mark.slow
 def test_kept_picture_against_live_settings(qtbot, session):
-    """Another policy gives equal bits, another seed other noise; the viewport continues."""
+    """Another policy keeps all bits, another seed changes the noise, and the viewport continues."""
     window = CompareWindow(session)
     qtbot.addWidget(window)
     window.show()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Light path expressions as layers: checked while typing, kept, displayed."""
+"""Light path expressions in the window: checks while typing, saved expressions, display."""
 
 import numpy as np
 import pytest

@@ -78,7 +78,7 @@ def moved(window, qtbot, tmp_path):
 
 
 def press(window, path, key, handle):
-    """Selects a prim and presses the mouse on one of its handles; returns the place."""
+    """Selects a prim and presses the mouse on one of its handles; returns the mouse position."""
     view = window.viewport
     window.session.select(path)
     view.setFocus()
@@ -181,7 +181,7 @@ def test_the_stage_is_loaded_again_where_a_move_is_refused(moved, qtbot, monkeyp
     before = session.scene.bounds_of(BALL)
 
     class Refusing:
-        """The renderer of the session, which refuses moves."""
+        """Wrapper of the session's renderer that refuses to move objects."""
 
         def __init__(self, core):
             self._core = core

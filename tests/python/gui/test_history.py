@@ -29,7 +29,7 @@ def stage_path(tmp_path_factory):
 
 
 class Steps:
-    """A number on a stage in memory, with its undo steps and a manual clock."""
+    """Edits of a number on an in-memory stage, with an undo history and a manual clock."""
 
     def __init__(self):
         stage = Usd.Stage.CreateInMemory()

@@ -12,7 +12,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 def test_a_map_keeps_what_there_is():
-    """The mean over the sphere equals the mean of the bins, which have equal solid angles."""
+    """The map's mean over the sphere equals the mean of the bins, which have equal solid angles."""
     density = np.random.default_rng(3).gamma(0.4, 1.0, (16, 16))
     height = 256
     values, _ = density_map(density, UP, np.array([1.0, 2.0, -3.0]), height)
@@ -37,9 +37,7 @@ def test_marks_are_where_the_map_has_the_direction(ahead):
 
 
 def test_bins_are_those_of_the_core():
-    """The map of directions matches that of tests/cpp/test_guide.cpp: +z in the middle, folded at z
-    = 0.
-    """
+    """Directions map to the same points of the square as in tests/cpp/test_guide.cpp."""
     w = np.array([[0, 0, 1], [0, 0, -1], [1, 0, 0], [0, -1, 0], [0.6, 0.0, -0.8]], float)
     assert square_points(w) == pytest.approx(
         np.array([[0.5, 0.5], [1, 1], [1, 0.5], [0.5, 0], [1, 0.5 + 0.5 * (1 - np.sqrt(0.2))]]),

@@ -144,7 +144,7 @@ def test_the_pace_of_previews_separates_constant_time_from_pixels():
 
 
 class RecordingRenderer:
-    """The core's renderer, with a list of the settings of its renders."""
+    """Wrapper of the core's renderer that records the settings of each render."""
 
     def __init__(self, scene, threads):
         from wavecomb import _core

@@ -30,7 +30,7 @@ MATERIAL = {**PROGRAM, "policy": "material"}
 
 
 def statistics(seconds: float, samples: float, length: float = 5.0) -> dict[str, Any]:
-    """Returns statistics of a render with 2 records per sample, and 8 of 16 lanes filled."""
+    """Returns statistics of a render with 2 hit records per sample and half-filled packets."""
     records = int(2 * samples)
     return {
         "seconds": {"render": seconds},
@@ -50,7 +50,7 @@ def fill(
     log: RunLog, settings: dict[str, Any], speed: float, seconds: float = 4.0, *,
     picture: Any = "picture", noise: float = 0.0, seed: int = 1, looks: int = 12,
 ) -> None:  # fmt: skip
-    """Adds a complete run with the given speed, half as fast in its second half."""
+    """Adds a complete run with the given speed, which is halved in the second half of the run."""
     rng = np.random.default_rng(seed)
     time = samples = 0.0
     dearness = np.where(np.arange(looks) < looks // 2, 1.0, 2.0)
@@ -177,7 +177,7 @@ def test_time_of_is_linear_between_looks() -> None:
 
 
 def test_runs_are_compared_at_equal_samples() -> None:
-    """A run's inexpensive first half has a higher rate, but equal speed at equal samples."""
+    """The faster first half of a run has a higher rate; at equal samples, the speeds are equal."""
     log = RunLog()
     fill(log, PROGRAM, 1.0)
     whole = log.series[0].run

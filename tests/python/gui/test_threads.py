@@ -83,7 +83,7 @@ def alone(test):
 @pytest.mark.slow
 @alone
 def test_garbage_that_holds_qt_is_found(qapp):
-    """Checks that ``Saved`` finds a Qt object in garbage, as other tests rely on."""
+    """``Saved`` finds a Qt object in garbage, on which the other tests rely."""
 
     class Loop(QObject):
         def __init__(self):

@@ -103,7 +103,7 @@ _PURPOSES = ("default", "render", "proxy", "guide")
 def find_settings(
     stage: Usd.Stage, wanted: str | None, report: LoadReport
 ) -> UsdRender.Settings | None:
-    """Returns the settings ``wanted``, the stage's default ones, or the only ones in /Render.
+    """Returns the settings named ``wanted``, else the default settings or the only ones in /Render.
 
     Raises:
         WavecombError: There are no render settings of that path or name.
@@ -319,7 +319,7 @@ _EVENTS = {
     "indirect": ("..+", "...*", ".{2,}", "<..><..>+"),
 }
 _PARTS = {events: name for name, all_events in _EVENTS.items() for events in all_events}
-"""AOV by the light path events between the camera and the light."""
+"""Maps the light path events between the camera and the light to the name of the AOV."""
 
 _LIGHT = r"(?:\[<L\.>O\]|\[LO\]|\[OL\]|\(L\|O\)|<L\.>|L)"
 _EXPRESSION = re.compile(rf"C(?P<events>.*?){_LIGHT}")
@@ -344,7 +344,7 @@ def aov_of(prim: UsdRender.Var) -> str | None:
 def _of_expression(text: str, name: str) -> str | None:
     """Returns the AOV of a light path expression; None if it is invalid.
 
-    The AOV of any other expression has the name of its render var.
+    All other expressions become custom AOVs that are named after their render vars.
 
     >>> [_of_expression(text, "a") for text in ("C.*", "C<..>[<L.>O]", "C.*<L.'key'>", "C<RD>L")]
     ['beauty', 'direct', 'light_key', 'lpe:a=C<RD>L']

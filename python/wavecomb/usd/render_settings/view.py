@@ -52,10 +52,11 @@ def view_settings(
 ) -> ViewSettings:
     """Combines options with the stage's render settings; options take precedence.
 
-    ``has_cameras`` may be False if the stage is known to have no cameras, which saves a search.
+    ``has_cameras`` is False if the caller knows that the stage has no cameras, which saves a
+    search.
 
     Raises:
-        WavecombError: The stage lacks something that the options name.
+        WavecombError: The options name render settings, a product or a camera that does not exist.
     """
     choices = read_product_settings(stage, options.render_settings, options.product, report)
     choice = choices[0]
@@ -95,8 +96,9 @@ def peek_products(
 ) -> tuple[list[ProductSettings], Usd.Stage]:
     """Reads a stage's render settings for each product; default settings if there are none.
 
-    Composes nothing else and reports nothing, since loading the stage repeats all messages. Keeping
-    the returned stage alive until the stage is loaded avoids reading its layers twice.
+    Opens only the part of a stage that render settings need. Discards all messages, because loading
+    the stage repeats them. Keeping the returned stage alive until the stage is loaded avoids
+    reading its layers twice.
 
     Args:
         source: .usd, .usda, .usdc or .usdz, or an open stage.

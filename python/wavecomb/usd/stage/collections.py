@@ -13,7 +13,8 @@ from wavecomb.usd.materials.draw_item import Parent
 from wavecomb.usd.stage.report import LoadReport, first_message
 
 Rules = dict[str, str]
-"""Rule for a path: exclude, explicit (only that path) or expand (the path and all below it)."""
+"""Rule for a prim path: exclude, explicit (only this prim) or expand (also all descendants).
+"""
 
 MAX_PRIMS = 1 << 20
 """Maximum number of prims at which an expression is evaluated; nested instancing may create
@@ -28,7 +29,7 @@ _RULES = {
 
 
 class Collections:
-    """Reader of a stage's collections as rules for paths."""
+    """Reader that converts the collections of a stage to rules for prim paths."""
 
     def __init__(self, report: LoadReport) -> None:
         self._report = report
@@ -114,7 +115,7 @@ def _is_authored(prim: Usd.Prim, name: str) -> bool:
 def _evaluated(
     stage: Usd.Stage, query: Usd.UsdCollectionMembershipQuery
 ) -> tuple[Rules | None, bool]:
-    """Evaluates a query at each prim and returns a rule for each change of membership.
+    """Evaluates a query at each prim; returns rules for prims that differ from their parents.
 
     The second result says whether all prims were evaluated. A point instancer is a member with all
     of its instances, so its prototypes are not evaluated.
@@ -184,7 +185,7 @@ def light_group(prim: Usd.Prim, inherited: Sequence[Any] | None = None) -> str:
 
 
 class LightGroups:
-    """Light groups of a stage: a limited number, with names that are valid in channel names."""
+    """Light groups of a stage, limited in number and named by valid channel names."""
 
     def __init__(self, report: LoadReport) -> None:
         self._report = report
@@ -214,13 +215,13 @@ def _is_asset(prim: Usd.Prim) -> bool:
 
 
 class Assets:
-    """The assets that contain prims: their nearest ancestors of kind component."""
+    """Finds the assets that contain prims. An asset is a prim of kind component."""
 
     def __init__(self) -> None:
         self._known: dict[Sdf.Path, int] = {Sdf.Path.absoluteRootPath: 0}
 
     def length_below(self, prim: Usd.Prim, path: str, parent: Parent | None) -> int:
-        """Returns ``length`` of the prim at a path, using the cached result of its parent."""
+        """Returns ``length`` of the prim, computed faster from the cached length of its parent."""
         if parent is None:
             return self.length(prim)
         if _is_asset(prim):

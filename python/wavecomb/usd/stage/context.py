@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stage, frame, origin, options and results that all readers of one load share."""
+"""State that all readers of one load share: stage, frame, origin, options and report."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ MANY = 4096
 """Maximum number of prims that determine the centre of a stage without a camera."""
 
 DEEP = 256
-"""Depth of the deepest prims that are considered, since USD computes transforms recursively."""
+"""Maximum depth of prims that are considered, because USD computes transforms recursively."""
 
 WORLD: Origin = (0.0, 0.0, 0.0)
 """The world's origin, which is used if the camera is close to it."""
@@ -202,8 +202,8 @@ class LoadContext:
         origin: World position that becomes the origin of the scene.
         purposes: Purposes of the geometry that is rendered.
         binding_purposes: Purposes of material bindings in order of preference.
-        framed: Directions (k, 3) in which the default camera needs the extent of the world; None if
-            a camera prim defines the view.
+        framed: Directions (k, 3) along which the world's extent is measured to frame the default
+            camera; None if a camera prim defines the view.
     """
 
     stage: Usd.Stage

@@ -38,7 +38,7 @@ class StandIn:
 
     Attributes:
         prim: Prim at the model's path on a separate stage, in the model's space.
-        kind: mesh or curves.
+        kind: Kind of the geometry, "mesh" or "curves".
         subsets: Subsets of the geometry's faces.
         materials: Materials of the face subsets.
     """

@@ -95,10 +95,10 @@ class RefinedCache:
 class FrameCache:
     """Data that ``load_stage`` reuses from the previous frame and stores for the next one.
 
-    ``has_same_levels`` returns whether another view, with another image size or None for the same
-    size, needs the same subdivision levels.
+    ``has_same_levels`` returns whether another view needs the same subdivision levels. An image
+    size of None means the previous size.
 
-    Contract: the cache serves one open stage, of which only the time changes.
+    The cache serves one open stage. Only the time may change between frames.
     """
 
     def __init__(self, stage: Usd.Stage, opening: LoadReport) -> None:

@@ -78,12 +78,12 @@ def load_stage(
     Args:
         source: A .usd, .usda, .usdc or .usdz file, or an open stage. An open stage stays open, is
             changed only if ``variants`` are given, and must not change during the call.
-        options: Options of the load. Mask, payloads and session layer require a file.
+        options: Options of the load. A mask, a payload option and a session layer require a file.
         editable: Whether to keep equal materials separate and to keep ``textures``, for programs
             that edit the scene. ``editable`` does not change the image.
         reuse: ``textures`` of an earlier load; textures of unchanged files are shared.
-        cache: Cache of an open stage that was read at another frame; unchanged data is shared. The
-            cache does not change the image.
+        cache: Cache of the same open stage, filled when another frame was read; unchanged data is
+            shared. The cache does not change the image.
         progress: Called with the number of prims read and the number found so far.
         builder_factory: Creates a scene builder without a texture store, for tests.
         **changes: Fields of ``LoadOptions`` that replace those of ``options``.
@@ -270,7 +270,7 @@ class _Load:
     def _set_camera(
         self, settings: ViewSettings, view: View | None, world: Group, planes: NDArray[np.float64]
     ) -> NDArray[np.float64] | None:
-        """Sets the camera and refines meshes for it; returns the outline that was framed."""
+        """Sets the camera and refines meshes; returns the outline if the default camera is used."""
         c, outline = self._context, None
         if view is None:
             c.report.note("no camera: framed what is drawn")

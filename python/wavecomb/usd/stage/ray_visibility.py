@@ -107,7 +107,7 @@ IGNORED = {
     "lit": frozenset({"holdout"}),
     "bare": frozenset({"holdout", "shadow", "bounces"}),
 }
-"""Kinds of visibility whose attributes are ignored, by ``LoadOptions.catch``."""
+"""Kinds of visibility whose attributes are ignored, for each value of ``LoadOptions.catch``."""
 
 
 def check_exists(stage: Usd.Stage, option: str, paths: Iterable[str]) -> None:

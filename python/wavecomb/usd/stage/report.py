@@ -106,7 +106,7 @@ class LoadReport:
         self._add("not supported", what, place, count)
 
     def absorb(self, other: LoadReport) -> None:
-        """Adds all messages and counts of another report, with this report's prototype names."""
+        """Adds all messages and counts of another report; renames paths in USD's prototypes."""
         for level, findings in other._found.items():
             for finding in findings.values():
                 first, *others = finding.all_places or [""]

@@ -7,7 +7,7 @@ from pxr import Usd
 
 
 def time_code(stage: Usd.Stage, frame: float | None) -> Usd.TimeCode:
-    """Returns the frame, else the stage's start, else the earliest sample of each attribute."""
+    """Returns the time code of a frame; None means the stage's start, or else earliest samples."""
     if frame is not None:
         return Usd.TimeCode(frame)
     if stage.HasAuthoredTimeCodeRange():

@@ -41,9 +41,9 @@ class AuthoredNames(NamedTuple):
     """Names of properties with authored opinions.
 
     Attributes:
-        names: All names.
-        has_primvars: Whether one of them is a primvar.
-        has_bindings: Whether one of them binds a material.
+        names: Names of all authored properties.
+        has_primvars: Whether the names include a primvar.
+        has_bindings: Whether the names include a material binding.
     """
 
     names: frozenset[str]
@@ -89,7 +89,7 @@ class CollectedPrims:
         return prims + [subset for draw in self.draws for subset in draw.subsets]
 
     def bind(self, materials: Iterable[UsdShade.Material | None]) -> list[UsdShade.Material | None]:
-        """Assigns materials to ``binding_prims``; returns those that are used on surfaces."""
+        """Assigns materials to ``binding_prims``; returns the materials of surfaces."""
         materials = iter(materials)
         for draw in (*self.draws, *self.volumes):
             draw.material = next(materials)
@@ -165,7 +165,8 @@ class Traversal:
         """Collects the prims at and below some roots, in stage order.
 
         Args:
-            roots: Prims to start from; their own transforms are included, their parents' are not.
+            roots: Prims to start from; transforms include those of the roots, but not those of
+                their parents.
             purpose: Purpose of the roots' parents.
             predicate: Predicate of the children to visit; None is USD's default.
             inherited: Constant primvars that the roots inherit.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads, validates and describes fields of volumes as grids for the core, each only once."""
+"""Reads, validates and describes the fields of volumes; each field becomes one grid of the core."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class GridFacts:
         grid: Name of the grid in the file.
         value: OpenVDB's name of the value type, such as "float", "half" or "vec3s".
         voxels: Number of active voxels of the grid.
-        bytes: Memory of the grid's bricks with their borders.
+        bytes: Memory of the grid's bricks including their borders, in bytes.
     """
 
     use: str
@@ -55,7 +55,7 @@ class VolumeFacts:
         name: Prim path of the volume.
         count: Number of instances of the volume.
         low: Lowest corner of the bounds of all instances in world space.
-        high: Highest corner of the same bounds.
+        high: Highest corner of the bounds of all instances in world space.
         grids: Grids of the volume; empty for a homogeneous volume.
     """
 
@@ -110,7 +110,7 @@ class GridTable:
         self._known: dict[tuple[Any, ...], Grid | None] = {}
 
     def find(self, fields: Mapping[str, Field], name: str) -> Field | None:
-        """Returns the field with a given name, or else a field whose grid has the name."""
+        """Returns the field with a given name, or else a field whose grid has this name."""
         if name in fields:
             return fields[name]
         for field in fields.values():
@@ -120,7 +120,7 @@ class GridTable:
         return None
 
     def first_vector(self, fields: Mapping[str, Field], names: Sequence[str]) -> Field | None:
-        """Returns the first vector field that has one of the names, or whose grid has one."""
+        """Returns the first vector field whose name or grid name is one of ``names``."""
         for name in names:
             for field in fields.values():
                 head = self._head(field)

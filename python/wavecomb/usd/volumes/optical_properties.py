@@ -31,7 +31,7 @@ class FieldColour:
         return not any(self.colour)
 
     def scaled(self, by: Colour) -> FieldColour:
-        """Returns the product with another colour, multiplied by the same field."""
+        """Returns a copy whose colour is multiplied by ``by``; the field is unchanged."""
         return replace(self, colour=product(self.colour, by))
 
 
@@ -63,7 +63,8 @@ class OpticalProperties:
 
 
 DEFAULT_PROPERTIES = OpticalProperties()
-"""Properties of a volume without material: white smoke with extinction 1 per unit at density 1."""
+"""Properties of a volume without material: white smoke, extinction 1 per stage unit.
+"""
 
 
 def product(a: Colour, b: Colour) -> Colour:

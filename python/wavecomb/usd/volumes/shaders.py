@@ -263,7 +263,7 @@ _READERS = {
     "arnold:volume_sample": "channel",
     "volume_sample": "channel",
 }
-"""Prefixes of ids of nodes that read a field, with the input that names it."""
+"""Maps id prefixes of nodes that read a field to the name of the input that names the field."""
 
 
 class Inputs:

@@ -21,7 +21,7 @@ from wavecomb.usd.volumes.material import VolumeMaterials
 from wavecomb.usd.volumes.optical_properties import BLACK, Colour, OpticalProperties
 
 GLOW = 1e-4
-"""Product of emission and size from which a volume counts as a light."""
+"""Minimum product of emission and size for which a volume counts as a light."""
 
 _MAX_ANISOTROPY = 0.999
 

@@ -2,7 +2,8 @@
 """Converts MaterialX's ``chiang_hair_bsdf`` to the program "hair".
 
 The program takes a colour and roughnesses (docs/hair.md); the node takes absorption and, per lobe,
-variance and scale. If a node drives the absorption, a graph computes the inverse mapping.
+variance and scale. If a node drives the absorption, a value graph converts the absorption to a
+colour.
 """
 
 from __future__ import annotations
@@ -111,7 +112,7 @@ class HairReader(SurfaceReader):
         return found[0] if len({node.GetPath() for node in found}) == 1 else None
 
     def _pair(self, shader: UsdShade.Shader, lobe: str) -> tuple[float, float]:
-        """Returns variance and scale of a lobe, clamped as in MaterialX."""
+        """Returns the variance and the scale of a lobe, clamped to MaterialX's ranges."""
         source = source_of(shader, f"roughness_{lobe}", self.time)
         given = None if source is None else source.value
         if source is not None and source.shader is not None:
@@ -158,7 +159,7 @@ class HairReader(SurfaceReader):
         return float(value[0])  # type: ignore[arg-type]
 
     def _tint(self, shader: UsdShade.Shader, name: str) -> float:
-        """Returns the luminance of a tint, since the program has no coloured tints."""
+        """Returns the luminance of a tint, since the program "hair" has no coloured tints."""
         source = source_of(shader, name, self.time)
         if source is None:
             return 1.0

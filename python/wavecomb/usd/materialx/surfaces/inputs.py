@@ -23,7 +23,7 @@ _SLIDERS = {"emissive_strength": 10.0, "attenuation_distance": 10.0, "thickness"
 
 
 class _ReadInputs(LayerInputs):
-    """Fake shader inputs, all of value 1, that record the names which ``layers_of`` reads."""
+    """Fake shader whose inputs are all 1; it records the inputs that ``layers_of`` reads."""
 
     def __init__(self) -> None:
         self.read: set[str] = set()
@@ -68,7 +68,7 @@ def definitions(model: str, identifier: str = "") -> dict[str, InputDefinition]:
 
 @functools.cache
 def _documented(model: str) -> Any:
-    """Returns MaterialX's document of a shading model."""
+    """Returns the MaterialX document that defines a shading model."""
     import MaterialX as mx
 
     document = mx.createDocument()

@@ -36,11 +36,11 @@ class Row:
     Attributes:
         input: Name of the shader's input.
         default: Default of the input: a number, a colour, or a bool for a switch.
-        factor: Factor on a number.
-        divisor: Divisor of a number.
-        driven: Whether a node may drive the parameter. A parameter that nodes may not drive has the
-            mean of the node's value everywhere, unless ``drive_layers`` handles the input.
-        weight: Input that multiplies the parameter, with its default.
+        factor: Number by which a numeric input is multiplied.
+        divisor: Number by which a numeric input is divided.
+        driven: Whether a node may drive the parameter. Otherwise the parameter is the mean of the
+            node's value, unless ``drive_layers`` handles the input.
+        weight: Name and default of the input by which the parameter is multiplied.
     """
 
     input: str
