@@ -21,9 +21,9 @@ Bounds mesh_bounds(const Mesh& mesh);
 void add_instance_bounds(Bounds& out, const Bounds& box, const Instance& instance,
                          std::span<const MatrixStep> steps);
 
-/// Returns the world bounds, over the whole shutter interval, of all meshes at or below a prim
-/// (named as by ObjectNames). Returns empty bounds if no mesh is at or below the prim. Visits every
-/// object of the scene, so call it rarely.
+/// Returns the world bounds, over the whole shutter interval, of all meshes at or below a prim. The
+/// prim path has the form of `ObjectNames`. Returns empty bounds if no mesh is at or below the
+/// prim. Visits every object of the scene, so call it rarely.
 Bounds object_bounds(const Scene& scene, std::string_view prim);
 
 }  // namespace wavecomb

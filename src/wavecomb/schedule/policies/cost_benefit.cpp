@@ -8,7 +8,8 @@ namespace {
 
 /// Sorts by program, then by
 ///   score = sum of the throughput of the material's records / (material cost + texture cost),
-/// highest first, then by the Morton code of the hit. There is one score per material and queue.
+/// highest first, then by the Morton code of the hit. All records of a material in a queue have the
+/// same score.
 class CostBenefitPolicy final : public SchedulingPolicy {
  public:
   std::string_view name() const override { return "cost-benefit"; }

@@ -4,7 +4,7 @@
 namespace wavecomb {
 namespace {
 
-/// Keeps arrival order: the baseline for all other policies.
+/// Keeps arrival order. This policy is the baseline for all other policies.
 class NonePolicy final : public SchedulingPolicy {
  public:
   std::string_view name() const override { return "none"; }
