@@ -16,10 +16,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Tiles per chunk of address space, unless a texture needs more.
+/// Minimum number of tiles in a chunk of address space. A larger texture gets a larger chunk.
 constexpr uint32_t kChunkTiles = 4096;
-/// Number of reader threads that one keeper thread (a thread that loads tiles from the file)
-/// serves.
+/// Number of render threads per thread that loads tiles from the file.
 constexpr unsigned kReadersPerLoader = 8;
 constexpr unsigned kMaxLoaders = 8;
 
@@ -65,8 +64,8 @@ uint64_t TileStore::resident_bytes() const {
 }
 
 size_t TileStore::tile_limit() const {
-  // Minimum number of tiles in memory, so that concurrent readers do not evict each other's tiles
-  // for ever.
+  // Minimum number of tiles in memory. With fewer tiles, concurrent readers could evict each
+  // other's tiles endlessly.
   constexpr size_t kLeast = 32;
   const uint64_t own = std::min(queue_.bytes() + counts_.grid_bytes, limit_bytes_);
   return std::max<size_t>(kLeast, (limit_bytes_ - own) / tile_bytes_);
@@ -240,7 +239,8 @@ void TileStore::spill() {
     file->write(address(first), bytes, offset);
     file->write(nothing.data(), range.count * tile_bytes_ - bytes, offset + bytes);
   }
-  // Start the threads before memory is released, since only they can bring tiles back.
+  // Start the loader threads before any tile is evicted, since only these threads can load evicted
+  // tiles.
   start_loaders();
   for (const auto& [first, range] : ranges_)
     faults_.release(address(first), range.count * tile_bytes_);

@@ -24,22 +24,24 @@ struct StoreStatistics {
   /// Memory limit.
   uint64_t limit_bytes = 0;
   uint64_t texture_bytes = 0;   ///< size of all stored textures
-  uint64_t file_bytes = 0;      ///< size of the temporary file; 0 if everything fits in memory
+  uint64_t file_bytes = 0;      ///< size of the temporary file; 0 if all textures fit in memory
   uint64_t resident_bytes = 0;  ///< memory in use, including the store's own tables
   uint64_t peak_bytes = 0;      ///< maximum of resident_bytes
   uint64_t grid_bytes = 0;      ///< memory of volume grids, which reduces the room for textures
   uint64_t loads = 0;           ///< number of tiles read back from the file
   uint64_t releases = 0;        ///< number of tiles evicted
-  double load_s = 0;            ///< seconds spent reading back, summed over threads
+  double load_s = 0;  ///< seconds spent on reading tiles from the file, summed over threads
 };
 
-/// Texture memory of which at most `limit_bytes`, including volume grids, is resident. Grids stay
-/// in memory as a whole; their size reduces the room for textures, down to a few tiles.
+/// Memory for textures, with a limit on the resident part. The limit `limit_bytes` covers textures
+/// and volume grids. Volume grids are always resident, and their size reduces the memory for
+/// textures, at most down to a few tiles.
 ///
 /// Readers use plain pointers. While all textures fit, they stay in memory. When a texture does not
-/// fit, the store writes all textures to a temporary file. From then on, reading an absent tile of
-/// kTileBytes loads the tile, and evicts another tile if needed. Threads of the store load and
-/// evict tiles while the reader waits in a page fault, so that readers notice only the delay.
+/// fit, the store writes all textures to a temporary file. After that, a read of an absent tile
+/// loads the tile from the file and, if memory is full, evicts another tile. Threads of the store
+/// load and evict tiles while the reader waits in a page fault, so that readers notice only the
+/// delay.
 ///
 /// Contract: all members may be called concurrently. A caller of remove() must ensure that no
 /// thread reads the memory. Only user code may read textures: the operating system cannot resolve
@@ -52,36 +54,37 @@ class TileStore {
   /// Smallest memory limit, which leaves room for a few tiles of each reader.
   static constexpr uint64_t kMinBytes = 1'000'000;
 
-  /// `folder`: for the temporary file, which may grow to the size of all textures. Throws Error if
-  /// the limit is below kMinBytes or the system lacks support (UserFaults::unsupported_reason).
+  /// The temporary file is created in `folder` and may grow to the size of all textures. Throws
+  /// Error if the limit is below kMinBytes or the system does not support demand-filled memory
+  /// (UserFaults::unsupported_reason).
   TileStore(uint64_t limit_bytes, std::string folder);
   ~TileStore();
   TileStore(const TileStore&) = delete;
   TileStore& operator=(const TileStore&) = delete;
 
-  /// Sets the size of the images from which textures will be built, which are in memory outside the
-  /// store.
+  /// Sets the memory size of images that are loaded but not yet converted to textures. These images
+  /// are outside the store but count towards the limit.
   void set_waiting(uint64_t bytes);
-  /// Announces that a texture is being built, which uses `bytes` and `scratch_bytes` outside the
-  /// store, in addition to set_waiting(). Throws Error if textures must move to the file and
-  /// cannot.
+  /// Reserves memory for building a texture of `bytes` bytes with `scratch_bytes` bytes of
+  /// temporary memory, both outside the store. Moves all textures to the temporary file if the
+  /// limit would be exceeded, and throws Error if that fails.
   void expect(uint64_t bytes, uint64_t scratch_bytes);
-  /// Stores a copy of `data` and returns its address, valid until remove(). Throws Error if there
-  /// is no room.
+  /// Stores a copy of `data` and returns its address, valid until remove(). Throws Error if memory,
+  /// address space or disk space is exhausted.
   const std::byte* add(const std::byte* data, size_t bytes);
   /// Frees memory returned by add().
   void remove(const std::byte* at);
 
-  /// Registers a grid of `bytes` bytes in memory and evicts textures to make room. Each
-  /// unregister_grid() undoes one call; the last one unregisters the grid. Throws Error like
-  /// expect().
+  /// Registers a grid of `bytes` bytes in memory and evicts textures to make room. A grid that was
+  /// registered several times needs as many calls of unregister_grid(). Throws Error if textures
+  /// must move to the temporary file and this fails.
   void register_grid(const void* grid, size_t bytes);
   void unregister_grid(const void* grid);
 
   uint64_t limit_bytes() const { return limit_bytes_; }
   StoreStatistics statistics() const;
-  /// Throws Error if a tile could not be read back or there was no memory for it. Tiles that cannot
-  /// be read are black.
+  /// Throws Error if loading a tile from the file failed or there was no memory for the tile. Tiles
+  /// that cannot be read are black.
   void check() const;
 
  private:
@@ -100,11 +103,11 @@ class TileStore {
   const std::byte* address(uint32_t tile) const;
   uint32_t tile_at(const std::byte* at) const;
   uint64_t resident_bytes() const;
-  /// Calls spill() if textures, grids and `more` bytes would exceed the limit in memory.
+  /// Calls spill() if the memory of textures and grids plus `more` bytes would exceed the limit.
   void spill_before(uint64_t more);
-  /// Number of tiles that fit within the limit.
+  /// Returns the number of tiles that fit within the memory limit.
   size_t tile_limit() const;
-  /// Evicts tiles until the resident ones fit.
+  /// Evicts tiles until the resident tiles fit within the memory limit.
   void evict_tiles();
   /// Moves all textures to the temporary file. Throws Error on failure.
   void spill();
@@ -113,9 +116,9 @@ class TileStore {
 
   // The functions below run on threads of the store and must not throw, because nothing would catch
   // the exception.
-  /// Serves page faults until stopped.
+  /// Loads the tiles of page faults until the store is destroyed.
   void keep(std::byte* buffer) noexcept;
-  /// Loads the tile of address `at` and wakes its readers.
+  /// Loads the tile that contains address `at` and wakes the threads that wait for the tile.
   void serve(const std::byte* at, std::byte* buffer);
 
   const uint64_t limit_bytes_;
@@ -123,13 +126,13 @@ class TileStore {
   const std::string folder_;
   UserFaults faults_;
   mutable std::mutex mutex_;
-  std::unique_ptr<TileFile> file_;             ///< null while everything fits in memory
+  std::unique_ptr<TileFile> file_;             ///< null while all textures fit in memory
   std::vector<Chunk> chunks_;                  ///< stored textures, sorted by first tile
   std::map<const std::byte*, size_t> places_;  ///< index into chunks_ by base address
   std::map<uint32_t, Range> ranges_;           ///< tile ranges in use, by first tile
   std::map<uint32_t, uint32_t> free_;          ///< free tile ranges: first tile and count
   TileQueue queue_;
-  uint64_t held_bytes_ = 0;  ///< size of textures in memory while there is no file
+  uint64_t held_bytes_ = 0;  ///< size of all textures while there is no temporary file
   uint64_t waiting_bytes_ = 0;
   struct Grid {
     size_t bytes;
@@ -142,7 +145,7 @@ class TileStore {
   enum class Failure : uint8_t { kNone, kFile, kMemory };
   std::atomic<Failure> failure_{Failure::kNone};
   int reason_ = 0;                  ///< errno of a failure to get memory
-  std::vector<std::byte> buffers_;  ///< buffer of one tile per keeper thread
+  std::vector<std::byte> buffers_;  ///< one tile-sized buffer per loader thread
   std::vector<std::thread> loaders_;
 };
 

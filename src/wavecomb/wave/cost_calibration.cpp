@@ -6,8 +6,8 @@
 namespace wavecomb {
 namespace {
 
-/// Largest number of instances to search. This number suffices to find every material of a typical
-/// scene and takes negligible time.
+/// Maximum number of instances in which to look for triangles of each material. This number
+/// suffices to find every material of a typical scene and takes negligible time.
 constexpr size_t kMaxInstances = 1 << 14;
 /// Number of faces to inspect in each mesh, evenly spaced.
 constexpr size_t kFaces = 256;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Wave integrator: each worker runs waves on its own buffers, with the kernels of one lane width.
+/// Wave integrator. Each worker runs waves in its own buffers, with kernels of one lane width.
 #pragma once
 
 #include <memory>
