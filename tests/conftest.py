@@ -16,8 +16,8 @@ import parts
 import pytest
 import tiers
 
-# Turn the sandbox off: a command in the sandbox starts a new Python process, which would delay
-# hundreds of tests. Tests of the sandbox pass --sandbox on.
+# Turn the sandbox off. A sandboxed command starts a new Python process, which would delay hundreds
+# of tests. Tests of the sandbox pass --sandbox on.
 os.environ.setdefault("WAVECOMB_SANDBOX", "off")
 
 # Tests start hundreds of processes, which should not compile the package each time. A process in

@@ -118,8 +118,8 @@ def compare(cycles: list[Image], wavecomb: list[Image]) -> dict[str, float]:
         if a[..., i].mean() > 0.02 * mean
     ]
     blocks = [_blocks(image) for image in (a, b)]
-    # The difference of the halves estimates the error of their mean, pooled over all blocks in
-    # proportion to brightness.
+    # Estimate the noise of each block from the difference between two half renders. Pool the
+    # estimates over all blocks, in proportion to brightness.
     errors = [_blocks(one) for one in half]
     own = np.sqrt(errors[0] ** 2 + errors[1] ** 2)
     pooled = np.sqrt(np.mean((own / (blocks[0] + 0.05 * mean)) ** 2)) * (blocks[0] + 0.05 * mean)

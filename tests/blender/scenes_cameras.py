@@ -170,7 +170,8 @@ def _fog(kind: str, **inputs: Any) -> Any:
     material = bpy.data.materials.new("fog")
     material.use_nodes = True
     shader(material, kind, to="Volume", **inputs)
-    # Above the floor: where faces coincide, the medium's extent is undefined.
+    # Keep the cube slightly above the floor: if faces coincide, the extent of the medium is
+    # undefined.
     cube(material, at=(0, 0, 1.02))
     return material
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Helpers for tests of programs and lobes: directions and their charts for chi_square.h, sample
-/// points, white furnaces, and parameters. The helpers use double precision, the code under test
-/// floats.
+/// points, white furnaces, and parameters. The helpers compute in double precision.
 #pragma once
 
 #include <cmath>
@@ -22,9 +21,9 @@ inline Vec3<float> direction(double cos_theta, double phi) {
           static_cast<float>(cos_theta)};
 }
 
-/// Charts of directions: chart 0 is the upper hemisphere, chart 1 the lower. The coordinates are x
-/// = 1 - |cos theta| and y = azimuth, so that the solid angle dw is dx dy, and no precision is lost
-/// at the poles.
+/// Charts of directions: chart 0 is the upper hemisphere, and chart 1 is the lower hemisphere. The
+/// coordinates are x = 1 - |cos theta| and y = azimuth, so that the solid angle dw is dx dy, and no
+/// precision is lost at the poles.
 inline std::vector<chi_square::Chart> direction_charts() {
   return {{0, 1, -kPiD, kPiD}, {0, 1, -kPiD, kPiD}};
 }
@@ -53,8 +52,8 @@ inline Point3 kronecker(uint32_t i) {
   return {p[0], p[1], p[2]};
 }
 
-/// Returns the radiance reflected in a white furnace: the mean sample weight of the brightest
-/// channel, without radiance scaling.
+/// Returns the radiance that a material reflects in a white furnace, which is the mean sample
+/// weight of the brightest channel. Scaling of radiance by refraction is left out.
 template <typename Bsdf>
 double furnace(const Bsdf& bsdf, const Vec3<float>& wo, uint32_t samples = 40000) {
   double sum[3] = {0, 0, 0};
@@ -69,7 +68,7 @@ double furnace(const Bsdf& bsdf, const Vec3<float>& wo, uint32_t samples = 40000
   return std::max({sum[0], sum[1], sum[2]}) / samples;
 }
 
-/// Returns default parameters with a colour.
+/// Returns default material parameters with the given colour.
 inline OpenPbrParams<float> plain_params() {
   const Vec3<float> black(0.f), white(1.f);
   OpenPbrParams<float> p{};
@@ -92,8 +91,8 @@ inline OpenPbrParams<float> plain_params() {
   return p;
 }
 
-/// Converts `p` to the parameter type of program `Bsdf`. Program-specific parameters are set to the
-/// fraction `own` of their range.
+/// Converts `p` to the parameter type of program `Bsdf`. Parameters that only one program has are
+/// set to the fraction `own` of their range.
 template <typename Bsdf, typename F>
 ParamsOf<Bsdf, F> params_for(const OpenPbrParams<F>& p, float own = 0.5f) {
   constexpr const ProgramInfo& kInfo = info_of(Bsdf::kProgram);

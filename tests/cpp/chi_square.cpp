@@ -27,7 +27,8 @@ constexpr size_t kLongSamples = 1000000;
 
 constexpr size_t kFineSamples = 800;
 constexpr size_t kMaxFine = 1024, kMinFine = 16, kCoarse = 32;
-/// Number of k-d tree leaves per cell, for many samples and for few.
+/// Number of k-d tree leaves per cell: `kManyLeaves` for tests with many samples, `kFewLeaves` for
+/// tests with few samples.
 constexpr size_t kManyLeaves = 8, kFewLeaves = 3;
 /// Number of test batteries in the whole program, for Sidak's correction.
 constexpr size_t kBatteries = 25;
@@ -41,8 +42,8 @@ struct Counts {
   }
 };
 
-/// Groups consecutive leaves into cells until each expects at least `least` samples. Leaves with an
-/// expected count of 0 form one last cell.
+/// Groups consecutive leaves into cells with an expected count of at least `least` samples each.
+/// Leaves with an expected count of 0 form one last cell.
 struct Cells {
   Counts counts;
   std::vector<size_t> first_leaf;
@@ -210,8 +211,9 @@ Result compare(const Case& c, uint32_t seed, size_t samples) {
   result.nothing = static_cast<double>(nothing) / n;
   result.disagreeing = static_cast<double>(disagreeing) / static_cast<double>(checked);
 
-  // The remainder to 1 is the probability that the sampler returns no sample. The tolerance
-  // includes the integration error, which is not the sampler's fault.
+  // The probability that the sampler returns no sample is 1 minus the integral of the density and
+  // the probabilities of all atoms. Ignore deviations within the tolerance, since the integral has
+  // an error.
   result.slack = std::max(c.slack, 60 / n);
   const double left = std::max(0.0, 1 - result.mass - result.atoms) * n;
   const double beyond =
@@ -252,7 +254,8 @@ void Battery::run(const Case& c) {
                 *std::min_element(result.p_values.begin(), result.p_values.end()));
     std::fflush(stdout);
   }
-  // Drop the case's closures: they may refer to objects that no longer exist when judge() runs.
+  // Store the case without its functions: these may refer to objects that no longer exist when
+  // judge() runs.
   entries_.push_back({{c.name, {}, {}, {}, c.odd}, result});
 }
 

@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Chi-square tests of samplers with cells of equal mass.
 ///
-/// A sampler draws a point of a domain, which is covered by rectangles ("charts"), or an atom,
-/// which has a probability (delta lobes, point lights), or nothing. A k-d tree splits the charts at
-/// medians of pilot samples until each leaf has a few of them, so a lobe of a thousandth of a
-/// radian gets as many leaves as one that fills the hemisphere. The density is integrated
-/// adaptively over each leaf, and consecutive leaves form cells of equal mass. A separate set of
-/// samples is then counted in the cells. Each atom is a cell; so is "no sample", which expects the
-/// remainder to 1.
+/// A sample is a point, an atom, or nothing. Points lie in a domain that is covered by rectangles
+/// ("charts"). Atoms have a probability instead of a density, such as delta lobes and point lights.
+/// A k-d tree splits the charts at medians of pilot samples until each leaf has a few samples, so a
+/// lobe of a thousandth of a radian gets as many leaves as a lobe that fills the hemisphere. The
+/// density is integrated adaptively over each leaf, and consecutive leaves form cells of equal
+/// mass. A separate set of samples is then counted in the cells. Each atom is a separate cell, and
+/// so is the outcome "no sample", whose expected probability is 1 minus the sum of all other
+/// probabilities.
 ///
 /// The test uses fine cells of about 1000 samples, which detect narrow faults, and 32 coarse cells,
-/// which detect small faults of whole lobes. `WAVECOMB_LONG=1` draws a million samples, `make test`
-/// fewer.
+/// which detect small faults of whole lobes. Tests draw a million samples with `WAVECOMB_LONG=1`,
+/// and fewer in `make test`.
 #pragma once
 
 #include <cstdint>
@@ -53,7 +54,8 @@ struct Draw {
   Place place;
   uint64_t atom = 0;
   double probability = 0;
-  bool agrees = true;  ///< density and weight agree with the evaluation at the sampled point
+  /// whether the density and weight of the sample equal those of an evaluation at the sampled point
+  bool agrees = true;
 
   static Draw nothing() { return {}; }
   static Draw at(const Place& place, bool agrees = true) {
@@ -71,13 +73,14 @@ struct Case {
   std::function<double(const Place&)> density;  ///< per dx dy
   /// Draws a sample; sets Draw::agrees if `check` is true.
   std::function<Draw(Random&, bool check)> draw;
-  /// Allowed fraction of samples that do not agree, because rounding moves them across an edge.
+  /// Allowed fraction of samples with Draw::agrees false, since rounding may move a sample across
+  /// an edge.
   double odd = 1e-3;
-  /// Tolerance of the integral of the density, which uses floats. The test raises the tolerance for
-  /// small sample counts, for which k-d tree leaves are large.
+  /// Tolerance of the integral of the density, since densities are computed in float. The test
+  /// raises the tolerance for small sample counts, for which k-d tree leaves are large.
   double slack = 5e-4;
-  /// True for smooth densities, whose lobes have wide tails that pilot evaluations find; false for
-  /// densities with jumps.
+  /// Whether the density is smooth, so that pilot evaluations find the wide tails of its lobes.
+  /// False for densities with jumps.
   bool is_smooth = true;
   /// Minimum number of integration boxes along each axis of a chart; large for densities that jump
   /// along curves.
@@ -93,27 +96,29 @@ struct Result {
   double disagreeing = 0;  ///< fraction of samples that do not agree
   std::string worst;       ///< fine cell with the largest deviation
 
-  /// Describes the failure at the given level for each p-value; empty if the test passes.
+  /// Returns a description of the failure, or an empty string if the test passes. `level` is the
+  /// significance level of each p-value.
   std::string fault(const Case& c, double level) const;
 };
 
-/// Number of samples of a test: 10^6 with WAVECOMB_LONG, fewer in `make test`, and fewest under
-/// sanitizers.
+/// Returns the number of samples of a test: 10^6 with WAVECOMB_LONG, fewer in `make test`, and
+/// fewest under sanitizers.
 size_t usual_samples();
 
-/// Compares `samples` draws with the density.
+/// Draws `samples` samples and compares their counts with the density.
 Result compare(const Case& c, uint32_t seed, size_t samples = usual_samples());
 
-/// Probability that a chi-square variable of `dof` degrees of freedom exceeds x.
+/// Returns the probability that a chi-square variable with `dof` degrees of freedom exceeds x.
 double chi_square_p(double x, double dof);
 
-/// Returns the p-value of observed counts. Cells that expect fewer than 5 are merged. Returns 0 if
-/// the merged cells expect fewer than 5 but observe 25 more than that.
+/// Returns the p-value of observed counts. Cells with an expected count below 5 are merged into one
+/// cell. Returns 0 if the expected count of the merged cell is still below 5 but its observed count
+/// is larger by 25 or more.
 double p_of_counts(const std::vector<double>& observed, const std::vector<double>& expected);
 
-/// Level of each of `tests` independent tests so that the probability of any false alarm is `level`
-/// (Z. Sidak, "Rectangular Confidence Regions for the Means of Multivariate Normal Distributions",
-/// 1967).
+/// Returns the significance level for each of `tests` independent tests such that the probability
+/// of any false alarm is `level` (Z. Sidak, "Rectangular Confidence Regions for the Means of
+/// Multivariate Normal Distributions", 1967).
 double sidak(double level, size_t tests);
 
 /// The test cases of one chi-square battery. By Sidak's correction over all batteries and the
@@ -121,7 +126,7 @@ double sidak(double level, size_t tests);
 class Battery {
  public:
   explicit Battery(std::string name);
-  /// Compares a case, with its index as seed.
+  /// Runs the chi-square test of a case. The seed is the index of the case in the battery.
   void run(const Case& c);
   /// Adds a p-value that the caller computed.
   void add(const std::string& name, double p_value);

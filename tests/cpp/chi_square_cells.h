@@ -21,7 +21,7 @@ struct Box {
 using Point = std::array<double, 2>;
 using Points = std::vector<Point>::iterator;
 
-/// Extent of the points relative to the box.
+/// Returns the extent of the points along an axis, as a fraction of the extent of the box.
 inline double spread(const Box& box, Points first, Points last, size_t axis) {
   const auto [low, high] = std::minmax_element(
       first, last, [axis](const Point& a, const Point& b) { return a[axis] < b[axis]; });
@@ -41,9 +41,9 @@ class Integral {
       if (pilot[i].chart == chart) highest_ = std::max(highest_, 2 * c.density(pilot[i]));
   }
 
-  /// Integrates the density over a box. Splits a box until pilot samples fill it, since they
-  /// indicate where lobes are. Then splits each half until the integral changes by less than
-  /// `tolerance`; each half gets 0.7 of the tolerance.
+  /// Integrates the density over a box. First splits the box until its pilot samples, which show
+  /// where lobes are, fill at least 40 % of its extent. Then splits boxes until the integral
+  /// changes by less than `tolerance`; each split multiplies the tolerance by 0.7.
   double over(const Box& box, Points first, Points last, double tolerance, int depth = 60) const {
     if (depth > 0 && last - first > 2) {
       const double fill[2] = {spread(box, first, last, 0), spread(box, first, last, 1)};
@@ -62,7 +62,8 @@ class Integral {
   }
 
  private:
-  /// Position of a split: the middle of the box, or the boundary of a column or row close to it.
+  /// Position of a split: the middle of the box, or the nearest boundary of a column or row if it
+  /// lies inside the box.
   struct Cut {
     double at;
     bool is_border;
@@ -78,7 +79,7 @@ class Integral {
 
   struct Estimate {
     double sum;
-    std::array<double, 2> bend;  ///< second differences along each axis
+    std::array<double, 2> bend;  ///< sum of absolute second differences along each axis
   };
 
   /// Integrates a box by the product of two 3-point Gauss rules.
@@ -101,10 +102,10 @@ class Integral {
     return e;
   }
 
-  /// Whether `sum`, the integral over both halves of a box, is accurate enough, given `whole`, one
-  /// rule over the entire box. A narrow lobe may hide from both integration rules or look equally
-  /// small to both, but rarely also from a third rule and the pilot samples. A box is also accepted
-  /// if it is so small that even the highest density in the chart would contribute little.
+  /// Returns whether `sum`, the integral over both halves of a box, is accurate enough. `whole` is
+  /// the integral by a single rule over the box. Since these rules can miss a narrow lobe, a third
+  /// rule and the pilot samples must agree with them. A box is also accepted if it is so small that
+  /// even the highest density in the chart would contribute little.
   bool is_symbol(const Box& box, double whole, double sum, Points first, Points last,
                  double tolerance) const {
     const double area = box.extent(0) * box.extent(1), change = std::abs(sum - whole);
@@ -199,7 +200,7 @@ class Leaves {
     bool can_split = false;
     if (count >= 2 * points_of_leaf_) {
       const double x = spread(box, first, last, 0), y = spread(box, first, last, 1);
-      // Alternate axes, unless the points are spread along one axis only.
+      // Alternate between the axes, unless the points differ along one axis only.
       axis = x < 0.3 * y ? 1 : y < 0.3 * x ? 0 : next;
       for (int attempt = 0; attempt < 2 && !can_split; ++attempt) {
         if (attempt > 0) axis = 1 - axis;

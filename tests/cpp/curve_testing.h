@@ -60,7 +60,8 @@ inline CurveData strands(Primitive primitive, uint32_t n, uint32_t segments, flo
     for (uint32_t k = 0; k < points; ++k) {
       data.point(at, radius * (1.2f - static_cast<float>(k) / static_cast<float>(points)),
                  Vec3<float>(0, 0, 1) + random() * 0.3f);
-      // Cubic curves are smooth at joints: the steps before and after a joint are equal.
+      // To make cubic curves smooth at joints, use equal steps between control points before and
+      // after a joint.
       if (!cubic || k % 3 != 2)
         turn = along + random() * (0.6f * size / static_cast<float>(points));
       if (cubic && k % 3 == 0 && k > 0)
@@ -130,8 +131,8 @@ inline GaussianSplatData random_gaussian_splats(uint32_t n, float size, float sc
   return data;
 }
 
-/// A scene with curves, points and splats of every kind and program, with textures, presence and
-/// instances (mirrored, stretched), and triangles.
+/// Makes a scene of triangles, curves, points and Gaussian splats, with all kinds of primitives and
+/// programs, textures, presence, and mirrored and stretched instances.
 inline ScenePtr hairy() {
   SceneBuilder b;
   const uint32_t image = add_texture(b, 16, 8, 3, random_texels(16 * 8 * 3, 0.1f, 0.9f, 1));

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Integrals over the microfacets of a rough surface, in double precision with fixed quadrature
-/// points, as references for energy tests. This code is independent: it shares nothing with the
-/// code under test.
+/// points, as references for energy tests. This code shares no code with the code under test.
 #pragma once
 
 #include <algorithm>
@@ -26,7 +25,8 @@ inline Crossing fresnel(double c, double eta) {
   return {0.5 * (p * p + s * s), t};
 }
 
-/// Mean Fresnel reflectance from outside, 2 int F(c) c dc.
+/// Mean Fresnel reflectance for diffuse light from outside: the integral of 2 F(c) c dc from 0 to
+/// 1.
 inline double mean_fresnel(double eta) {
   constexpr int kSteps = 4000;
   double sum = 0;
@@ -37,9 +37,10 @@ inline double mean_fresnel(double eta) {
   return sum / kSteps;
 }
 
-/// Visible GGX normals for a viewer of cosine `z` and azimuth `phi`, each with equal weight
-/// (midpoints of the map of Dupuy and Benyoub, "Sampling Visible GGX Normals with Spherical Caps",
-/// 2023). Each normal has the ratio G2 / G1 of its reflected and its refracted direction.
+/// GGX microfacet normals that are visible from the direction with cosine `z` and azimuth `phi`.
+/// All normals have equal weight (midpoints of the map of Dupuy and Benyoub, "Sampling Visible GGX
+/// Normals with Spherical Caps", 2023). For each normal, the table stores the ratio G2 / G1 of the
+/// reflected and of the refracted direction.
 class SeenFacets {
  public:
   SeenFacets(double z, double phi, double ax, double ay, double eta, int steps = 96) {
@@ -74,12 +75,14 @@ class SeenFacets {
       }
   }
 
-  /// Mean reflection for `reflectance`, a function of the cosine between normal and viewer.
+  /// Returns the mean reflection. `reflectance` is a function of the cosine between the microfacet
+  /// normal and the viewing direction.
   template <typename Reflectance>
   double up(Reflectance reflectance) const {
     return mean([&](const Facet& f) { return reflectance(f.cosine) * f.up; });
   }
-  /// Mean transmission for `transmittance`, a function of the cosine between normal and viewer.
+  /// Returns the mean transmission. `transmittance` is a function of the cosine between the
+  /// microfacet normal and the viewing direction.
   template <typename Transmittance>
   double down(Transmittance transmittance) const {
     return mean([&](const Facet& f) { return transmittance(f.cosine) * f.down; });
@@ -88,7 +91,7 @@ class SeenFacets {
   struct Facet {
     double cosine, up, down;
   };
-  /// Mean of a function of microfacets.
+  /// Returns the mean of a function over all visible microfacets.
   template <typename Function>
   double mean(Function function) const {
     double sum = 0;

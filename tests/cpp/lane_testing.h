@@ -18,8 +18,8 @@ namespace wavecomb::lane_testing {
 inline constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 inline constexpr float kInf = std::numeric_limits<float>::infinity();
 
-/// Calls f.operator()<F>() for each packet type that the library has kernels for: the widest of the
-/// target in `make test`, every width in `make test-long`.
+/// Calls f.operator()<F>() for each packet type with kernels in this build: the widest type in
+/// `make test`, and all widths in `make test-long`.
 template <typename Function>
 void for_each_packet([[maybe_unused]] const Function& f) {
 #ifdef WAVECOMB_HAS_LANES_4
@@ -39,7 +39,7 @@ void for_each_lane_type(const Function& f) {
   for_each_packet(f);
 }
 
-/// A mask with the lanes of `bits` set.
+/// Makes a mask in which lane i is set if bit i of `bits` is set.
 template <typename F>
 inline Mask<F> make_mask(uint32_t bits) {
   if constexpr (kIsScalar<F>) {
@@ -99,7 +99,7 @@ inline std::vector<float> padded(std::vector<float> values, size_t n, float lo, 
   return values;
 }
 
-/// Applies a function of one lane value to all of x with lane type F.
+/// Applies the function `f` to all values of x, in lanes of type F.
 template <typename F, typename Function>
 std::vector<float> map(const std::vector<float>& x, const Function& f) {
   std::vector<float> y(x.size());

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Charts of lights as seen from a point, for chi_square.h. Each light has a chart on its surface,
 /// so cells resolve narrow and wide lights equally well, and edges of lights are edges of charts.
-/// All quantities are computed independently, in double precision.
+/// All quantities are computed in double precision, without code of the renderer.
 ///
 ///    rect      fractions of its edges
 ///    disk      squared distance from its centre, azimuth
@@ -94,14 +94,15 @@ class LightCharts {
   Ray ray(const chi_square::Place& p) const {
     Ray r = any_ray(p);
     const uint32_t of = seen_[p.chart].light;
-    // The direction belongs to the chart of a portal, so it has no solid angle in this chart.
+    // This direction belongs to the chart of a portal. Set its solid angle in this chart to 0.
     if (r.solid_angle > 0 && seen_[of].portals > 0 && portal(of, r.dir) != p.chart)
       r.solid_angle = 0;
     if (seen_[p.chart].light != p.chart) r.distance = double{kFarAway};
     return r;
   }
 
-  /// Returns where a unit direction hits `light`, or the nearest point if rounding makes it miss.
+  /// Returns the chart point at which the unit direction hits `light`, or the nearest chart point
+  /// if rounding makes the direction miss the light.
   chi_square::Place place(uint32_t light, const Vec3<float>& direction) const {
     const D3 w(direction);
     const uint32_t chart = seen_[light].portals > 0 ? portal(light, w) : light;
@@ -291,7 +292,8 @@ class LightCharts {
     return {h / s.size, turn < 0 ? turn + 1 : turn};
   }
 
-  /// Perpendicular distance from the receiver to the near side of a cylinder, at an angle across.
+  /// Returns the distance from the receiver to the near side of a cylinder, in the plane
+  /// perpendicular to its axis and at an angle from the direction to the axis.
   static double across(const Seen& s, double angle) {
     const double off = s.distance * std::sin(angle);
     return s.distance * std::cos(angle) - std::sqrt(std::max(0.0, s.radius * s.radius - off * off));
@@ -316,12 +318,13 @@ class LightCharts {
   std::vector<Seen> seen_;
 };
 
-/// Tests sample_light with all lights of a view and receiver `to`: the choice of a light together
-/// with the point on it. Lights without extent are atoms of the chi-square test.
+/// Makes a chi-square case of sample_light() for one receiver and all lights of a view. It tests
+/// the selection of the light together with the point on the light. Lights without extent are
+/// atoms.
 ///
-/// The density is the one that MIS uses for hits (light_hit, triangle_light_pdf, and the densities
-/// of infinite lights); it is 0 where no light arrives. A sample agrees if its density and weight
-/// match that evaluation.
+/// The expected density is the light sampling density that MIS uses when a ray hits a light; it is
+/// 0 where no light arrives. A sample agrees if its density and weight equal the values for a ray
+/// that hits the light at the same point.
 inline chi_square::Case light_case(std::string name, const LightView& view,
                                    const LightReceiver<float>& receiver) {
   struct Seen {
@@ -354,7 +357,7 @@ inline chi_square::Case light_case(std::string name, const LightView& view,
   c.name = std::move(name);
   c.charts = seen->charts.charts();
   c.is_smooth = false;
-  // Shaping cones, IES profiles and portals cause jumps inside charts.
+  // The density can jump inside charts because of shaping cones, IES profiles and portals.
   const bool is_cut = view.shapings || view.portals;
   if (is_cut && c.charts.size() < 8) c.boxes = is_long() ? 256 : 32;
   c.density = [seen](const chi_square::Place& p) {

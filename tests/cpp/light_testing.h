@@ -98,8 +98,8 @@ inline EmissiveTriangle make_triangle(const Vec3<float>& a, const Vec3<float>& b
   return t;
 }
 
-/// Returns the distance along dir to the geometry of the first light: a rect, disk, sphere,
-/// cylinder or triangle.
+/// Returns the distance along `dir` to the shape of the first light of a view, which is a rect,
+/// disk, sphere, cylinder or triangle.
 inline std::optional<float> trace(const LightView& view, const Vec3<float>& origin,
                                   const Vec3<float>& dir) {
   LightRecord r{};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Random lights, and light selection, for tests.
+/// Random lights and light selection for tests of the light tree.
 #pragma once
 
 #include <cmath>
@@ -12,7 +12,8 @@
 
 namespace wavecomb::light_testing {
 
-/// Portable random numbers; the distributions of standard libraries differ.
+/// Random numbers that are the same on all platforms; the distributions of standard libraries
+/// differ.
 struct Numbers {
   std::mt19937 rng;
   explicit Numbers(uint32_t seed) : rng(seed) {}
@@ -24,8 +25,8 @@ struct Numbers {
   Vec3<float> direction() { return square_to_sphere<float>((*this)(), (*this)()); }
 };
 
-/// Makes `n` finite lights of all kinds, including black ones and points, and `infinite` infinite
-/// ones.
+/// Makes `n` finite lights of all kinds, including black lights and point lights, and `infinite`
+/// infinite lights.
 inline Lights random_lights(size_t n, uint32_t seed, size_t infinite = 0) {
   Numbers number(seed);
   std::vector<Light> lights;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// A test medium: homogeneous fog that fills all space. The test medium uses all hooks that
-/// integrators offer to media.
+/// A test medium: homogeneous fog that fills all space. The test medium implements every function
+/// of the medium interface.
 #pragma once
 
 #include "wavecomb/core/encoding/hash.h"
@@ -36,7 +36,7 @@ class FogPhase : public BsdfTraits {
     return {square_to_sphere(u, v), albedo_, F(kDensity), Mask<F>(false), F(1.f), F(1.f)};
   }
 
-  /// Interaction with the fog, in place of a surface (path/steps/interact.h).
+  /// Interaction with the fog, used instead of a surface interaction (path/steps/interact.h).
   struct Interaction {
     FogPhase bsdf;
     Color<F> throughput;
@@ -72,12 +72,12 @@ struct Fog {
   using Programs = ProgramList<DiffuseBsdf<F>, EmissiveBsdf<F>, FogPhase<F>>;
 
   Vec3<float> extinction;
-  uint32_t material;          ///< a material of program "principled"
+  uint32_t material;          ///< id of a material of program "principled"
   bool tracks_ratio = false;  ///< Whether shadow rays estimate transmittance by ratio tracking
                               ///< instead of exp.
 
-  /// Samples a distance by the extinction of a random channel, each with probability 1/3, weighted
-  /// by the densities of all three:
+  /// Samples a distance with the extinction of a random colour channel, chosen with probability
+  /// 1/3, and divides the weight by the mean density of all three channels:
   ///    stopped at x:  sigma exp(-sigma x) / mean_c(sigma_c exp(-sigma_c x))
   ///    not before t:  exp(-sigma t) / mean_c(exp(-sigma_c t))
   template <typename F>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// White furnace of OpenPBR by numerical integration of the model's formulas in double precision.
-/// Rough interfaces use facet_integrals.h; none of the tables, fits and samplers of the program are
-/// used. Colours are three numbers.
+/// Rough interfaces use facet_integrals.h. The code uses no tables, fits or samplers of the shading
+/// program. Colours are three numbers.
 #pragma once
 
 #include <array>
@@ -14,8 +14,9 @@ namespace wavecomb::facet_integrals {
 
 using Rgb = std::array<double, 3>;
 
-/// Sensor response to cos(2 pi opd / lambda) in linear Rec.709 for an optical path difference in
-/// nanometres; 1 for a difference of 0 (Belcour and Barla 2017, code that accompanies the paper).
+/// Returns the response in linear Rec.709 to the spectrum cos(2 pi opd / lambda), where `opd` is an
+/// optical path difference in nanometres. The result is 1 for a difference of 0 (Belcour and Barla
+/// 2017, code that accompanies the paper).
 inline Rgb film_response(double opd) {
   constexpr double kTau = 2 * std::numbers::pi;
   const auto raw = [](double nm) {
@@ -35,12 +36,12 @@ inline Rgb film_response(double opd) {
   return {at[0] / still[0], at[1] / still[1], at[2] / still[2]};
 }
 
-/// A thin film: Airy sum over orders 0 to 3.
+/// Thin film on a base, computed as an Airy sum over the interference orders 0 to 3.
 struct Film {
   double thickness, ior;
 
-  /// Reflectance at cosine c of the film over a base with these amplitudes of reflection inside the
-  /// film.
+  /// Returns the reflectance of the film at cosine c. The arguments are the reflection amplitudes
+  /// of the base inside the film.
   Rgb over(double c, const Rgb& base_s, const Rgb& base_p) const {
     const double grown = std::clamp(thickness / 30, 0.0, 1.0);
     const double eta = 1 + (ior - 1) * grown * grown * (3 - 2 * grown);
@@ -79,7 +80,7 @@ struct Film {
   }
 };
 
-/// A function of the cosine with three values, tabulated at 1025 points.
+/// Colour as a function of a cosine, tabulated at 1025 points.
 class Curve {
  public:
   template <typename Function>
@@ -142,8 +143,8 @@ class OpenPbrModel {
     }
   }
 
-  /// Radiance that the material reflects in a white furnace towards cosine z and azimuth phi;
-  /// `below` views it from inside.
+  /// Returns the radiance that the material reflects in a white furnace towards the direction with
+  /// cosine z and azimuth phi. With `below`, the viewer is inside the material.
   Rgb seen(double z, double phi, bool below) const {
     const bool inside = below && glass_ > 0 && !thin_;
     const double eta = inside ? 1 / ior_ : ior_;
@@ -199,7 +200,8 @@ class OpenPbrModel {
     Rgb f;
     for (size_t k = 0; k < 3; ++k) {
       const double f0 = base_[k], schlick = std::pow(1 - c, 5);
-      // The edge tint multiplies edge_ by Schlick's value at cosine 1 / 7 (Kutz et al. 2021).
+      // At cosine 1 / 7, the reflectance is Schlick's value multiplied by the edge tint (Kutz et
+      // al. 2021).
       const double at = f0 + (1 - f0) * std::pow(6.0 / 7, 5);
       const double b = at * (1 - edge_[k]) / (1.0 / 7 * std::pow(6.0 / 7, 6));
       f[k] = std::clamp(f0 + (1 - f0) * schlick - b * c * schlick * (1 - c), 0.0, 1.0);
@@ -248,7 +250,8 @@ class OpenPbrModel {
            facets.up([&](double c) { return fresnel(c, coat_ior_).reflectance; });
   }
 
-  /// Darkening by the coat, (1 - K) / (1 - K E) (OpenPBR, "Coat darkening").
+  /// Returns the darkening of the base by the coat, (1 - K) / (1 - K E) (OpenPBR, "Coat
+  /// darkening").
   double darkened(double z, size_t k) const {
     const double smooth = fresnel(z, coat_ior_).reflectance;
     const double rough = 1 - (1 - mean_fresnel(coat_ior_)) / (coat_ior_ * coat_ior_);

@@ -22,8 +22,8 @@ inline bool is_on(const char* name) {
   return !(value.empty() || value == "0" || value == "false" || value == "no" || value == "off");
 }
 
-/// Whether a missing requirement is a failure: WAVECOMB_STRICT if it is set, else whether this is
-/// CI.
+/// Returns whether a missing requirement is a failure. WAVECOMB_STRICT decides if it is set;
+/// otherwise, a missing requirement is a failure in CI only.
 inline bool is_strict() {
   return is_on(std::getenv("WAVECOMB_STRICT") ? "WAVECOMB_STRICT" : "CI");
 }
@@ -33,7 +33,8 @@ inline bool is_long() {
   return is_on("WAVECOMB_LONG");
 }
 
-/// Whether this run includes a case of a table: all cases in long tests, otherwise every n-th.
+/// Returns whether this run includes a case of a table. Long tests run all cases, and other runs
+/// every n-th case.
 inline bool includes_case(size_t index, size_t n) {
   return is_long() || index % n == 0;
 }

@@ -26,8 +26,8 @@ struct Case {
   }
   /// Whether transmission refracts; false for thin walls.
   bool bends() const { return program != ProgramId::kOpenPbr || params.thin_walled == 0; }
-  /// OpenPBR scales lower layers by the viewer's side only, so most of its materials are not
-  /// reciprocal.
+  /// Most OpenPBR materials are not reciprocal, because the scaling of lower layers depends only on
+  /// the viewing direction.
   bool reciprocal() const {
     return program != ProgramId::kOpenPbr || name.find("reciprocal") != std::string::npos;
   }
@@ -82,7 +82,8 @@ inline void add_openpbr(std::vector<Row>& all) {
     p.roughness = 0.5f;
     p.clearcoat = 0.8f, p.clearcoat_roughness = r, p.coat_color = Vec(1, 0.6f, 0.3f);
   });
-  // Microfacets of this coat often reflect below the surface, where the base transmits.
+  // Microfacets of this rough coat often reflect to directions below the surface, in which the base
+  // transmits.
   add("coated glass", {1.f}, [](P& p, float r) {
     p.roughness = 0.2f;
     p.transmission_weight = 1, p.clearcoat = 1, p.clearcoat_roughness = r;
@@ -110,7 +111,7 @@ inline void add_openpbr(std::vector<Row>& all) {
   });
 }
 
-/// Returns the table. The table includes materials without a roughness or with a fixed one.
+/// Returns the table. The table includes materials that have no roughness or a fixed roughness.
 inline std::vector<Row> table() {
   using Vec = Vec3<float>;
   std::vector<Row> all;
@@ -169,8 +170,8 @@ void with_bsdf(const Case& c, Function f) {
   });
 }
 
-/// Returns viewing directions at these cosines, from both sides for materials that are not
-/// two-sided.
+/// Returns viewing directions with the given cosines. For materials whose two sides differ, adds
+/// directions below the surface.
 inline std::vector<Vec3<float>> views(const Case& c,
                                       const std::vector<double>& cosines = {0.02, 0.25, 0.6, 1.0}) {
   std::vector<Vec3<float>> all;

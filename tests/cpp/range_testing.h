@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Textures and graphs of known ranges, and the kernel variants selected for materials that use
-/// them.
+/// Textures and value graphs with known value ranges, and the kernel variants that are selected for
+/// their materials.
 #pragma once
 
 #include "graph_ops.h"

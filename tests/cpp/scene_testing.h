@@ -74,7 +74,7 @@ inline Affine look_at(const std::array<double, 3>& eye, const std::array<double,
   return {{{f(x[0]), f(y[0]), f(z[0])}, {f(x[1]), f(y[1]), f(z[1])}, {f(x[2]), f(y[2]), f(z[2])}},
           {f(eye[0]), f(eye[1]), f(eye[2])}};
 }
-/// Makes a camera whose window at z = -1 is `size` wide and high.
+/// Makes a camera whose image plane at z = -1 is `size` wide and high.
 inline Camera make_camera(const std::array<double, 3>& eye, const std::array<double, 3>& at,
                           float size = 1) {
   Camera camera;
@@ -418,7 +418,8 @@ inline ScenePtr emissive_meshes() {
   return b.build();
 }
 
-/// Layers of cut-out leaves before a wall, with opacity from a constant, a texture and a threshold.
+/// Makes a scene of several layers of cut-out leaves in front of a wall. Their opacity is a
+/// constant, a texture, or a texture with a threshold.
 inline ScenePtr presence() {
   SceneBuilder b;
   const uint32_t mask = add_texture(b, 8, 8, 1, random_texels(64, -0.2f, 1.2f, 6));
@@ -487,7 +488,7 @@ inline void expect_same_image(const RenderedImage& a, const RenderedImage& b,
   }
 }
 
-/// Returns the AOV layer of that name, which must exist.
+/// Returns the AOV layer called `name`, which must exist.
 inline const AovLayer& layer(const RenderedImage& image, const std::string& name) {
   const auto at = std::find_if(image.aovs.begin(), image.aovs.end(),
                                [&](const AovLayer& one) { return one.name == name; });
@@ -495,7 +496,8 @@ inline const AovLayer& layer(const RenderedImage& image, const std::string& name
   return *at;
 }
 
-/// Mean of one channel over all pixels and its standard error, for independent pixels.
+/// Returns the mean of a channel over all pixels, and its standard error if the noise of pixels is
+/// independent.
 struct Mean {
   double mean = 0, error = 0;
 };
@@ -513,7 +515,7 @@ inline Mean mean_of(const RenderedImage& image, size_t channel = 0) {
   for (size_t i = channel; i < image.beauty.size(); i += 3) values.push_back(image.beauty[i]);
   return mean_of(values);
 }
-/// Mean of the pixel differences of two images.
+/// Returns the mean of the differences between the pixels of two images.
 inline Mean mean_difference(const RenderedImage& a, const RenderedImage& b, size_t channel = 0) {
   std::vector<double> values;
   for (size_t i = channel; i < a.beauty.size(); i += 3)

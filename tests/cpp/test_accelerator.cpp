@@ -85,7 +85,7 @@ struct Keys {
   PresenceKeys keys(uint32_t salt = 0) const { return {pixel_hash.data(), sample.data(), 1, salt}; }
 };
 
-/// Traces the rays in calls of at most `chunk` rays.
+/// Traces all rays, with at most `chunk` rays per call of the accelerator.
 Hits trace(const EmbreeAccelerator& accel, const Rays& rays, uint32_t width, bool coherent,
            const PresenceKeys& keys, bool limited = false, size_t chunk = 1u << 30) {
   Hits hits(rays.size);
@@ -146,7 +146,7 @@ void expect_hits_do_not_depend_on_packets(const EmbreeAccelerator& accel, const 
   for (const bool coherent : {false, true}) {
     if (coherent && !coherent_too) continue;
     for (const uint32_t width : {1u, 4u, 8u, 16u}) expect_same(width, coherent, rays.size);
-    // Partial packets: all lanes but one, and seven lanes.
+    // Test partial packets, with one inactive lane and with seven active lanes.
     for (const uint32_t width : {4u, 8u, 16u}) expect_same(width, coherent, width - 1);
     expect_same(16, coherent, 7);
   }
@@ -193,7 +193,8 @@ const std::vector<Affine>& transforms() {
       scale(-0.3f, -0.3f, -0.3f)};
   return all;
 }
-/// A random triangle soup in the world, and instances of a group of two more.
+/// Makes random triangles in the world, and instances of a group of two further meshes of random
+/// triangles.
 std::shared_ptr<const Scene> soup_scene(uint32_t triangles) {
   SceneBuilder b;
   b.add_to_group(0, b.add_mesh(make_mesh(soup(triangles, 1))));
@@ -206,12 +207,13 @@ std::shared_ptr<const Scene> soup_scene(uint32_t triangles) {
 }
 
 struct ExactHit {
-  double t, u, v, edge;  ///< Distance from the triangle's edge, in barycentric coordinates.
+  /// Distance of the hit from the nearest edge of the triangle, in barycentric coordinates.
+  double t, u, v, edge;
   uint32_t prim, geom, inst;
 };
 
-/// Finds all hits of a ray in double precision (Moeller and Trumbore), nearest first. `slack`
-/// enlarges triangles by that distance in barycentric coordinates.
+/// Finds all hits of a ray in double precision (Moeller and Trumbore), nearest first. Triangles are
+/// enlarged by the distance `slack` in barycentric coordinates.
 class BruteForce {
  public:
   explicit BruteForce(const Scene& scene) {
@@ -285,7 +287,7 @@ class BruteForce {
 };
 
 /// Compares the hits of random rays with a brute-force search of `triangles` triangles, for a
-/// triangle list or a BVH. At least one ray in `one_in` must hit a triangle.
+/// triangle list or a BVH. At least 1 / `one_in` of the rays must hit a triangle.
 void expect_brute_force(uint32_t triangles, HitRule rule, size_t one_in) {
   const auto scene = soup_scene(triangles);
   const EmbreeAccelerator accel(scene, 2, rule);
@@ -323,7 +325,7 @@ TEST(Accelerator, HitsEqualBruteForceInDoublePrecision) {
   expect_brute_force(60, HitRule::kCanonical, 2);
 }
 
-/// Traces scenes small enough for a triangle list by the list and by the BVH.
+/// Traces small scenes both with a triangle list and with a BVH.
 class SmallScene : public testing::TestWithParam<HitRule> {};
 INSTANTIATE_TEST_SUITE_P(Accelerator, SmallScene,
                          testing::Values(HitRule::kList, HitRule::kCanonical),
@@ -339,7 +341,7 @@ TEST_P(SmallScene, IsTracedAsAsked) {
   EXPECT_FALSE(EmbreeAccelerator(curve_testing::hairy(), 1, GetParam()).has_list());
 }
 
-// Rays that start exactly on a surface, as when a camera's near plane lies on one.
+// Rays that start exactly on a surface, as camera rays do if the near plane lies on a surface.
 TEST_P(SmallScene, RaysThatStartOnASurfaceMeetItThere) {
   SceneBuilder b;
   b.add_to_group(0, b.add_mesh(make_mesh(quad({0, 0, 0}, {1, 0, 0}, {0, 1, 0}))));
@@ -382,8 +384,8 @@ TEST(Accelerator, CurvesAndPointsDoNotDependOnPackets) {
 }
 
 TEST(Accelerator, CameraRaysDoNotDependOnPackets) {
-  // Bundles of rays from one point or from a lens, for which the coherent flag is meant. Lens rays
-  // graze the edges of the Cornell box from many points, where coherent packets may differ from
+  // Bundles of rays from one point or from a lens, traced with the coherent flag. Rays from a lens
+  // pass close to edges of the Cornell box, where coherent packets may find different hits than
   // single rays.
   for (const auto& scene : {mixed(), cornell(), emissive_meshes()}) {
     const EmbreeAccelerator accel(scene, 2);
@@ -437,8 +439,8 @@ Rays rays_at_edges(const Mesh& mesh, const Affine& m, size_t n, uint32_t seed, F
   return rays;
 }
 
-/// Expects that coherent packets find nearly the same hits as single rays, on rays that are likely
-/// to show differences.
+/// Expects that coherent packets find nearly the same hits as single rays. The rays are chosen so
+/// that differences are likely.
 void expect_coherent_differs_seldom(const EmbreeAccelerator& accel, const Rays& rays) {
   const DenormalsOff denormals_off;
   const Keys keys(rays.size);
@@ -585,7 +587,7 @@ TEST(Accelerator, ListsHaveNoHoles) {
   }
 }
 
-// Which of two coincident triangles is reported depends on their ids, not on packets.
+// If two triangles coincide, the reported triangle depends on their ids, not on the packet width.
 TEST(Accelerator, CoincidentSurfacesDoNotDependOnPackets) {
   SceneBuilder b;
   b.add_to_group(0, b.add_mesh(make_mesh(grid(8, 0.3f, 1))));
@@ -631,7 +633,7 @@ TEST(Accelerator, IncoherentRaysAtCrossingSurfacesDoNotDependOnPackets) {
 }
 
 /// Compares occlusion with the hits of the same rays on `triangles` triangles, for a triangle list
-/// or a BVH. At least one ray in `one_in` must be blocked.
+/// or a BVH. At least 1 / `one_in` of the rays must be blocked.
 void expect_occlusion_agrees(uint32_t triangles, HitRule rule, size_t one_in) {
   const auto scene = soup_scene(triangles);
   const EmbreeAccelerator accel(scene, 2, rule);
@@ -643,7 +645,7 @@ void expect_occlusion_agrees(uint32_t triangles, HitRule rule, size_t one_in) {
   const std::vector<uint32_t> shadow = blocked(accel, rays, 16, false, keys.keys());
   size_t count = 0;
   for (size_t i = 0; i < n; ++i) {
-    // tfar excludes hits behind it and nothing else.
+    // Hits beyond `tfar` are excluded, and nearer hits are found.
     const bool expected = all.inst[i] != kNoHit && all.t[i] <= rays.tfar[i];
     EXPECT_EQ(near.inst[i] != kNoHit, expected) << i;
     if (expected) {
@@ -821,7 +823,7 @@ TEST_P(SmallScene, PresenceIsAProbability) {
 }
 
 TEST_P(SmallScene, PresenceKeysMayStandInRows) {
-  // The layout of the path pool: both words of a key are inside a row of 16.
+  // Keys are laid out as in the path pool: the two words of a key are inside a row of 16 words.
   const size_t n = 2000, words = 16;
   Rays rays(n);
   for (size_t i = 0; i < n; ++i) {

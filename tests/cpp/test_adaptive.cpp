@@ -41,7 +41,8 @@ TEST(ErrorSums, VarianceIsTheTwoPassOne) {
   std::exponential_distribution<float> light(0.5f);
   std::vector<double> seen;
   add_samples(film, 0, 0, 1000, [&](float* rgb) {
-    rgb[0] = 1e4f + light(rng);  // The mean is far from 0, where naive sums lose precision.
+    // The mean is large compared with the noise, so naive sums would lose precision.
+    rgb[0] = 1e4f + light(rng);
     rgb[1] = rgb[2] = 2;
     seen.push_back(rgb[0]);
   });
@@ -60,7 +61,8 @@ TEST(ErrorSums, NoVarianceBelowTwoSamples) {
 }
 
 /// Makes a film of `size` x `size` pixels with mean 1 and noise of standard deviation `sigma(x, y)`
-/// per sample. The samples are Gamma distributed: not negative, and skewed as light is.
+/// per sample. Samples have a gamma distribution, which is skewed and never negative, like
+/// radiance.
 Film noisy_film(uint32_t size, uint32_t samples, const auto& sigma, uint32_t seed = 1) {
   Film film(size, size, {AovSet{0}}, true);
   std::mt19937 rng(seed);
@@ -155,7 +157,7 @@ TEST(Adaptive, NoisyPixelsAndTheirNeighboursGoOn) {
     }
   EXPECT_EQ(c.active_count, (2 * reach + 1) * (2 * reach + 1));
   EXPECT_GT(c.expected_samples, 32u * 32 * 64);
-  // A pixel with the maximum number of samples is finished, however noisy it is.
+  // A pixel that has the maximum number of samples is finished, even if it is noisy.
   film.pixel(16, 16).samples = 1024;
   EXPECT_EQ(check(film, settings).active[16 * 32 + 16], 0);
 }
@@ -196,8 +198,8 @@ TEST(Adaptive, NoiseTargetEndsByTheMean) {
 }
 
 TEST(Adaptive, NoiseTargetIsMetByPicturesOfFewBrightPixels) {
-  // Isolated bright pixels: the window spreads the error of each over 25 pixels, so these fall
-  // below the threshold long before the whole image does.
+  // Tests isolated bright pixels. The window spreads the error of each bright pixel over 25 pixels,
+  // so these pixels reach the threshold long before the image as a whole.
   const auto is_star = [](uint32_t x, uint32_t y) { return x % 16 == 8 && y % 16 == 8; };
   std::mt19937 rng(7);
   Film film(32, 32, {AovSet{0}}, true);
@@ -257,13 +259,14 @@ TEST(ErrorMap, SeesTheNoiseOfSplats) {
 }
 
 TEST(Adaptive, LightPathsGoOnAsFarAsTheirNoiseDecides) {
-  // If light splats and camera samples have equal noise after 16 samples each and all pixels are
-  // active, both get equal numbers of samples.
+  // All pixels are active, and light splats and camera samples have equal noise after 16 samples
+  // each. Then light paths and camera paths get equal numbers of samples.
   EXPECT_EQ(light_samples_after({1, 1}, 16, 16, 64, 64, 1.0), 64u);
-  // With a sixteenth of the pixels active, a sample of light paths costs 16 times as much.
+  // If only 1/16 of the pixels are active, a light path sample costs 16 times as much relative to a
+  // camera sample.
   EXPECT_EQ(light_samples_after({1, 1}, 16, 16, 64, 64, 1.0 / 16), 16u);
   EXPECT_EQ(light_samples_after({1, 4}, 16, 16, 64, 64, 1.0 / 16), 32u);
-  // The number of light paths stays between the current count and the limit.
+  // The new number of light path samples is at least the current number and at most the limit.
   EXPECT_EQ(light_samples_after({1, 100}, 16, 16, 64, 64, 1.0), 64u);
   EXPECT_EQ(light_samples_after({100, 1}, 16, 16, 64, 64, 1e-3), 16u);
   EXPECT_EQ(light_samples_after({0, 0}, 16, 16, 64, 64, 1.0), 16u);

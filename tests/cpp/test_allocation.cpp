@@ -10,7 +10,7 @@
 #define WAVECOMB_COUNTS_ALLOCATIONS 1
 
 namespace {
-/// Number of allocations of this thread; operator new also ends in malloc.
+/// Number of malloc calls of this thread; operator new also calls malloc.
 thread_local uint64_t allocations = 0;
 }  // namespace
 

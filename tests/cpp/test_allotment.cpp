@@ -19,7 +19,8 @@ Settings allocated(uint32_t size, uint32_t spp, Allocate how = Allocate::kError)
   return s;
 }
 
-/// Adds `n` samples of `sample()` to a pixel, and `cost` for each if the film stores costs.
+/// Adds `n` samples with values from `sample()` to a pixel. If the film stores costs, adds `cost`
+/// for each sample.
 void add(Film& film, uint32_t x, uint32_t y, uint32_t n, float cost, const auto& sample) {
   Film::Pixel& p = film.pixel(x, y);
   for (uint32_t i = 0; i < n; ++i) {
@@ -58,7 +59,8 @@ TEST(SampleAllocation, GivesOutTheBudgetExactly) {
       EXPECT_EQ(total(a), uint64_t{spp} * size * size) << spp << " " << size;
       EXPECT_GE(facts.least, facts.pilot);
       EXPECT_EQ(facts.most, *std::max_element(a.counts.begin(), a.counts.end()));
-      // Sample counts of intermediate passes never decrease, and end at the allotted counts.
+      // The sample counts of pixels never decrease from pass to pass and end at the allotted
+      // counts.
       for (size_t i = 0; i < a.counts.size(); ++i) {
         EXPECT_EQ(a.at(i, a.spp), a.counts[i]);
         EXPECT_EQ(a.at(i, a.pilot), a.pilot);
@@ -69,8 +71,8 @@ TEST(SampleAllocation, GivesOutTheBudgetExactly) {
 }
 
 TEST(SampleAllocation, FollowsErrorAndCost) {
-  // The film has bands of 16 columns: a quiet one, a noisy one, a noisy one that costs 16 times as
-  // much, and a quiet one.
+  // The film has four bands of 16 columns: low noise, high noise, high noise with 16 times the
+  // cost, and low noise.
   const auto counts = [](Allocate how) {
     const Settings s = allocated(64, 256, how);
     Film film = film_of(s);
@@ -109,8 +111,8 @@ TEST(SampleAllocation, BlackAndBrokenPixelsAreAsOthers) {
   EXPECT_GE(facts.least, 32u);
 }
 
-/// Returns the bias of the mean image in standard errors, for pixels that are 20 with probability
-/// 1/20 and otherwise 0. `counts(film, settings)` decides the number of samples.
+/// Returns the bias of the image mean in standard errors. Samples are 20 with probability 1/20 and
+/// otherwise 0. `counts(film, settings)` returns the number of samples of each pixel.
 double bias_z(const auto& counts) {
   constexpr uint32_t kSize = 24, kRounds = 300;
   std::mt19937 rng(11);

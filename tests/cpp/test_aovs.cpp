@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// AOVs: names, Cryptomatte ids and ranks, object names, and memory of the film.
+// Tests of AOVs: layer names, Cryptomatte ids and ranks, object names, and film memory.
 #include <bit>
 #include <map>
 
@@ -69,7 +69,7 @@ TEST(Cryptomatte, ManyIdsKeepTheirBounds) {
     std::map<uint32_t, uint32_t> exact;
     constexpr uint32_t kSamples = 4096;
     for (uint32_t i = 0; i < kSamples; ++i) {
-      // Cryptomatte ids of decreasing frequency: a few frequent ones and a long tail.
+      // Random Cryptomatte ids: a few frequent ids and many rare ids.
       const double u = std::uniform_real_distribution<double>(0, 1)(rng);
       const auto id = static_cast<uint32_t>(300 * u * u * u * u * u) + 1;
       p.add(id);
@@ -90,7 +90,7 @@ TEST(Cryptomatte, ManyIdsKeepTheirBounds) {
   }
 }
 
-// Expects the numbers that docs/aovs.md states.
+// The expected numbers are those stated in docs/aovs.md.
 TEST(AovFilm, MemoryOfEveryAov) {
   const AovLayout all{AovSet{AovSet::kAll}, 4};
   const Film film(16, 9, all);
@@ -181,7 +181,7 @@ TEST(ObjectNames, SeenThroughInstances) {
   };
   b.add_to_group(0, mesh("/World/Set/Floor"));
   b.add_to_group(0, mesh("/World/Chairs/Red/Seat", 17));
-  // Two prims instance a tree; a nest inside the tree is a model.
+  // The scene has two instances of a tree, and inside the tree there is a model, a nest.
   const uint32_t tree = b.add_group("tree", "/World/Tree_1");
   b.add_to_group(tree, mesh("/World/Tree_1/Leaves"));
   b.add_to_group(tree, mesh("/World/Tree_1/Top/Nest/Egg", 22));

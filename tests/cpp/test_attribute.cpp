@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Mesh attributes: every interpolation, lanes of different meshes, and missing attributes.
+/// Tests of mesh attributes: all interpolation modes, packets with lanes on different meshes, and
+/// missing attributes.
 #include <gtest/gtest.h>
 
 #include <random>

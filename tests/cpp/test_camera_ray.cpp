@@ -37,7 +37,7 @@ TEST(CameraRay, PinholeAtCornersAndCentre) {
   camera.window[1] = 0.6f;
   camera.window[2] = -0.2f;
   camera.window[3] = 0.3f;
-  // 4 x 2 pixels of 0.25 x 0.25; y points down.
+  // The image has 4 x 2 pixels of size 0.25 x 0.25. Pixel y points down.
   expect_window(ray_at(camera, 4, 2, 0, 0, kCentre), -0.4 + 0.125, 0.3 - 0.125);
   expect_window(ray_at(camera, 4, 2, 3, 1, kCentre), 0.6 - 0.125, -0.2 + 0.125);
   expect_window(ray_at(camera, 4, 2, 0, 0, {0, 0, 0, 0}), -0.4, 0.3);
@@ -155,8 +155,8 @@ TEST(CameraRay, OrthographicAtCorners) {
 }
 
 TEST(CameraRay, CircleOfConfusion) {
-  // A thin lens of radius R focused at f blurs a point of the film over a disk of radius R |z / f -
-  // 1| at distance z, with and without perspective.
+  // A thin lens of radius R with focus distance f maps one film point to a disk of radius R |z / f
+  // - 1| at distance z. The test covers perspective and orthographic cameras.
   for (const Projection projection : {Projection::kPerspective, Projection::kOrthographic}) {
     Camera camera;
     camera.projection = projection;

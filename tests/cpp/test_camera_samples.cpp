@@ -59,8 +59,8 @@ Camera make_camera(Projection projection, float lens) {
   return camera;
 }
 
-/// Position where a ray of the pixel passes: on the image in pixels from the pixel centre, and on
-/// the lens in lens radii.
+/// Point of a camera ray on the image, in pixels relative to the pixel centre, and point on the
+/// lens, in units of the lens radius.
 struct Passed {
   double x, y, lens_x, lens_y;
 };
@@ -73,7 +73,7 @@ Passed pass(const CameraSetup& setup, Random& random) {
     window[0] = std::atan2(w[0], -w[2]);
     window[1] = std::asin(w[1]);
   } else {
-    // All rays of a point of the image meet in the focal plane.
+    // All rays through the same image point meet in the focal plane.
     const double f = setup.focus_distance, t = -f / w[2];
     const bool parallel = setup.projection == Projection::kOrthographic;
     for (int i = 0; i < 2; ++i) window[i] = (o[i] + t * w[i]) / (parallel ? 1 : f);
@@ -131,8 +131,8 @@ TEST(CameraSamples, FollowThePixelFilter) {
 }
 
 TEST(CameraSamples, FillTheLensEvenly) {
-  // Tests the squared distance from the centre of the lens with the azimuth in turns, then the
-  // squared distance with the position on the image; both pairs are independent.
+  // Tests two pairs of independent uniform values: the squared distance from the lens centre with
+  // the azimuth, and the squared distance with the position on the image.
   Battery battery("lens");
   const FilterTable table(FilterKind::kGaussian, 3);
   const auto density = filter_density(FilterKind::kGaussian, 3);
@@ -164,14 +164,14 @@ TEST(CameraSamples, FillTheLensEvenly) {
 }
 
 // Connections of light paths project a point to the film position of the camera ray through the
-// point. The density equals that of the rays of a pixel: the image area, in pixels, of a small area
-// perpendicular to the ray.
+// point. The density of the connection equals the density of camera rays, which is the image area,
+// in pixels, per area perpendicular to the ray.
 TEST(CameraConnections, AreTheWayBack) {
   const FilterTable table(FilterKind::kGaussian, 3);
   Random random(17);
   for (const CameraCase& seen : kCameras) {
     Camera made = make_camera(seen.projection, seen.lens);
-    // Rotated, mirrored, and scaled differently along each axis.
+    // The camera transform rotates, mirrors, and scales each axis differently.
     made.to_world.row[0] = {0.6f, -1.1f, 0.3f};
     made.to_world.row[1] = {0.9f, 0.8f, -0.2f};
     made.to_world.row[2] = {0.1f, 0.4f, 1.3f};
@@ -212,8 +212,7 @@ TEST(CameraConnections, AreTheWayBack) {
 }
 
 // A latlong image continues at its opposite edge, and beyond a pole with an offset of half a turn.
-// Light at the edge contributes as much as in the middle, at the position where camera samples see
-// the light.
+// Light near an image edge contributes as much as light in the middle of the image.
 TEST(CameraConnections, GoRoundAPictureOfAllDirections) {
   constexpr uint32_t kAcross = 24, kDown = 12;
   const FilterTable table(FilterKind::kGaussian, 4);
@@ -228,7 +227,7 @@ TEST(CameraConnections, GoRoundAPictureOfAllDirections) {
   const Film film(all, {}, false);
   Random random(5);
   for (int i = 0; i < 300; ++i) {
-    // Tests points near the edges; a camera sample of such a pixel may lie beyond the edge.
+    // Tests points near the edges. Camera samples of pixels at an edge may lie beyond the edge.
     const float x = 4 * random() - 2 + (i % 2 ? kAcross : 0);
     const float y = i % 3 == 0 ? 4 * random() - 2 + (i % 2 ? kDown : 0) : kDown * random();
     const CameraRay<float> ray = ray_through<float>(setup, x, y, 0.f, 0.f, 0.f, true);
@@ -250,7 +249,8 @@ TEST(CameraConnections, GoRoundAPictureOfAllDirections) {
         EXPECT_GE(weight[film.index(column, row)], double{own} - 2e-3) << x << " " << y;
       }
   }
-  // An image of half a turn shows nothing twice.
+  // A latlong image of only 180 degrees does not wrap around, so directions behind the camera are
+  // outside the image.
   made.window[0] = -0.5f * static_cast<float>(kPiD);
   made.window[1] = 0.5f * static_cast<float>(kPiD);
   const CameraSetup front(made, kAcross, kDown, table);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests of cascaded outlier rejection, which removes rare bright samples and nothing else.
+// Tests of cascaded outlier rejection, which must remove only rare bright samples.
 #include <gtest/gtest.h>
 
 #include <numeric>
@@ -53,7 +53,7 @@ TEST(Cascades, TakeAwayTheOneSampleThatNobodyHasBeside) {
 }
 
 TEST(Cascades, TrustWhatManySamplesSay) {
-  // One in eight samples is bright in every pixel, so bright samples belong to the true image.
+  // In every pixel, one sample in eight is bright, so bright samples belong to the true image.
   Film film = even_film(56, 1);
   for (uint32_t i = 0; i < kSide * kSide; ++i)
     for (uint32_t s = 0; s < 8; ++s) add_sample(film, i, 500, 500, 500);

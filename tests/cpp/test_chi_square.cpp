@@ -32,7 +32,7 @@ constexpr double kLevel = 1e-7;
 const size_t kSamples = is_long() ? 1000000 : 4 * chi_square::usual_samples();
 const double kFault = std::sqrt(1e6 / static_cast<double>(kSamples));
 
-/// The hemisphere, sampled by cosine.
+/// Chi-square case of cosine-weighted sampling of the hemisphere.
 Case cosine_case() {
   Case c{"cosine",
          bsdf_testing::direction_charts(),
@@ -45,8 +45,8 @@ Case cosine_case() {
   return c;
 }
 
-/// A material with two lobes, one of them narrow, and a delta lobe; optionally with modified
-/// samples.
+/// Principled material with a narrow lobe, a wide lobe and a delta lobe. The random numbers of its
+/// samples can be modified to simulate faults.
 struct Principled {
   OpenPbrParams<float> params = bsdf_testing::plain_params();
   Vec wo = direction(0.3, 0.4);
@@ -55,7 +55,7 @@ struct Principled {
     params.roughness = 0.1f;
     params.clearcoat = 0.5f;
   }
-  /// `change` modifies the sample value that selects the lobe.
+  /// Makes a chi-square case. `change` modifies the random number that selects the lobe.
   Case make(const std::function<float(float)>& change = [](float l) { return l; }) const {
     const PrincipledBsdf<float> bsdf(params, false);
     Case c{"principled", bsdf_testing::direction_charts(), {}, {}};
@@ -88,7 +88,8 @@ TEST(ChiSquare, PValuesOfKnownStatistics) {
 }
 
 TEST(ChiSquare, RightSamplersPassAsOftenAsTheLevelSays) {
-  // p-values are uniform: Kolmogorov-Smirnov statistic, whose 0.1 % point is 1.95 / sqrt(n).
+  // Test that p-values are uniformly distributed. The Kolmogorov-Smirnov statistic exceeds 1.95 /
+  // sqrt(n) with a probability of 0.1 %.
   std::vector<double> fine;
   for (uint32_t seed = 1; seed <= (is_long() ? 400u : 60u); ++seed) {
     const Result r = chi_square::compare(cosine_case(), seed, 4000);
@@ -156,8 +157,7 @@ TEST(ChiSquare, FindsLobesOfAnotherWidth) {
 
 TEST(ChiSquare, FindsLobesThatAreChosenTooOften) {
   const Principled material;
-  // Compares samplers that give one per cent too many or too few samples to the diffuse or the
-  // delta lobe.
+  // Tests samplers that select lobes with probabilities that are wrong by about one per cent.
   for (const double percent : {1.0, -1.0}) {
     const auto change = [=](float l) {
       return std::clamp(static_cast<float>(l + 0.01 * kFault * percent * (l < 0.5f ? -1 : 1) *
@@ -192,7 +192,7 @@ TEST(ChiSquare, FindsDeltaLobesAndNothingMoreOftenThanStated) {
 }
 
 TEST(ChiSquare, FindsNarrowLobesOfAnotherShare) {
-  // Tests a narrow lobe that should get two per cent of the samples and gets a tenth more.
+  // A narrow lobe should get two per cent of the samples, but gets more than that by a tenth.
   const Vec wo = direction(0.5, 0.4);
   const Ggx<float> ggx{1e-3f};
   constexpr double kShare = 0.02;

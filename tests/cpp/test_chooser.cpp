@@ -12,11 +12,11 @@
 namespace wavecomb {
 namespace {
 
-/// Simulates a chooser that selects among variants ("arms") with given run times, and keeps the
-/// score.
+/// Simulates a chooser that selects among several ways of working ("arms") with given run times,
+/// and adds up the time spent.
 class Game {
  public:
-  /// Run time of an arm per packet in round i; preparation costs `prepare` per record.
+  /// Returns the run time of an arm per packet in a given round, in nanoseconds.
   using RunNs = std::function<double(size_t arm, int round)>;
 
   Game(size_t arms, RunNs run_ns, std::vector<double> prepare_ns)
@@ -75,7 +75,7 @@ TEST(Chooser, TriesEachArmThenTakesTheLeast) {
 
 TEST(Chooser, WeighsRunningAgainstPreparing) {
   // Sorting costs 10 ns per record. With 1600 records, sorting halves 100 packets of 200 ns: it
-  // saves 10 us and costs 16 us. Where a packet takes 2000 ns, sorting saves 100 us.
+  // saves 10 us and costs 16 us. If a packet takes 2000 ns, sorting saves 100 us.
   Game inexpensive(2, fixed({200, 200}), {0, 10});
   inexpensive.work = {{100, 1600}, {50, 1600}};
   Game expensive(2, fixed({2000, 2000}), {0, 10});
@@ -86,7 +86,7 @@ TEST(Chooser, WeighsRunningAgainstPreparing) {
   }
   EXPECT_EQ(inexpensive.play(), 0u);
   EXPECT_EQ(expensive.play(), 1u);
-  // Uses the same chooser with a queue that arrives grouped, for which sorting saves no packets.
+  // The next queue arrives already grouped, so sorting saves no packets.
   expensive.work = {{50, 1600}, {50, 1600}};
   EXPECT_EQ(expensive.play(), 0u);
 }
@@ -96,14 +96,14 @@ TEST(Chooser, LearnsEachDepthForItself) {
   const std::vector<Work> work(2, Work{10, 100});
   const auto play = [&](uint32_t depth) {
     const size_t arm = chooser.choose(depth, work);
-    // At even depths arm 0 is faster, at odd depths arm 1.
+    // Arm 0 is faster at even path depths, and arm 1 at odd path depths.
     chooser.learn(depth, arm, work[arm], arm == depth % 2 ? 1000. : 2000., 0);
     return arm;
   };
   for (int i = 0; i < 10; ++i)
     for (uint32_t depth = 0; depth < 6; ++depth) play(depth);
   for (uint32_t depth = 0; depth < 6; ++depth) EXPECT_EQ(play(depth), depth % 2) << depth;
-  // Very large depths share one entry.
+  // All path depths above a limit share one entry.
   for (int i = 0; i < 10; ++i) play(1000 + Chooser::kDepths);
   EXPECT_NO_FATAL_FAILURE(play(0xffffffffu));
 }
@@ -131,7 +131,7 @@ TEST(Chooser, RegretIsBoundedWhereArmsAreAlike) {
 }
 
 TEST(Chooser, OneSlowMeasurementIsForgiven) {
-  // The best arm is measured first while the machine is busy.
+  // Random spikes in the measured times may make the best arm look slow at first.
   int hits = 0;
   for (uint32_t seed = 0; seed < 200; ++seed) {
     Game game(2, fixed({150, 100}), {0, 0});
@@ -157,7 +157,8 @@ TEST(Chooser, TriesAgainAtEveryDepth) {
 }
 
 TEST(Chooser, FollowsAChange) {
-  // Half-way the image content changes: the arm that was nearly as good becomes better.
+  // Halfway through the render, run times change: arm 1, which was nearly as good as arm 0, becomes
+  // better.
   Game game(2, [](size_t arm, int round) { return arm == 0 || round < 2000 ? 100. : 70.; }, {0, 0});
   game.work[1].packets = 105;
   for (int i = 0; i < 2000; ++i) game.play();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scenes of known radiance: the whole renderer against formulas.
+// Tests of the whole renderer on scenes whose radiance is known in closed form.
 #include "curve_testing.h"
 #include "wavecomb/accel/embree_accelerator.h"
 #include "wavecomb/core/sampler.h"
@@ -28,8 +28,9 @@ Settings settings(uint32_t side = 16, uint32_t spp = 256) {
   return s;
 }
 
-/// Expects the mean of the image to be `expected`. `within` is the relative error that the test
-/// must be able to detect, `bias` the error of the scene itself (tessellation).
+/// Expects the image mean to be `expected`, within a tolerance from the noise of the image. The
+/// tolerance must be at most `within`, relative to `expected`. `bias` is the relative error of the
+/// scene itself, for example from tessellation.
 void expect_radiance(const RenderedImage& image, double expected, const std::string& what,
                      double within = 0.005, double bias = 5e-5) {
   for (size_t c = 0; c < 3; ++c) {
@@ -187,7 +188,8 @@ TEST(ClosedForm, WhiteFurnace) {
 }
 
 TEST(ClosedForm, WhiteFurnaceOfCurves) {
-  // Tubes and spheres are closed, so they reflect all light that hits them; ribbons do as well.
+  // White curves and points reflect all light that hits them, so they have the radiance of the
+  // dome.
   for (const Primitive primitive : curve_testing::curved_primitives()) {
     SceneBuilder b;
     const uint32_t white = b.add_material(make_material(ProgramId::kDiffuse, {1, 1, 1}));
@@ -202,7 +204,8 @@ TEST(ClosedForm, WhiteFurnaceOfCurves) {
 }
 
 TEST(ClosedForm, InsideAGlowingBody) {
-  // L = Le + rho L everywhere; truncated after n scatterings, L = Le (1 - rho^(n + 1)) / (1 - rho).
+  // The radiance satisfies L = Le + rho L everywhere. With at most n scatterings, L = Le (1 -
+  // rho^(n + 1)) / (1 - rho).
   for (const bool round : {false, true}) {
     SceneBuilder b;
     constexpr float kRho = 0.5f;
@@ -224,7 +227,8 @@ TEST(ClosedForm, InsideAGlowingBody) {
 }
 
 TEST(ClosedForm, IntegratingSphere) {
-  // A point light in the centre: E = I / R^2 everywhere, L = rho / pi E / (1 - rho).
+  // A point light is in the centre of a sphere. The irradiance is E = I / R^2 everywhere, and the
+  // reflected radiance is L = rho / pi E / (1 - rho).
   SceneBuilder b;
   const uint32_t wall = b.add_material(make_material(ProgramId::kDiffuse, Vec3<float>(0.7f)));
   b.add_to_group(0, b.add_mesh(make_mesh(sphere(48, false).transform(scale(2, 2, 2)), wall)));
@@ -239,7 +243,8 @@ TEST(ClosedForm, IntegratingSphere) {
 }
 
 TEST(ClosedForm, MirrorChain) {
-  // Two facing mirrors, hit four times at 45 degrees, with Schlick's formula at each.
+  // A ray hits two facing mirrors four times at 45 degrees. Each reflection follows Schlick's
+  // formula.
   SceneBuilder b;
   const uint32_t mirror = b.add_material(make_material(ProgramId::kMetal, {0.9f, 0.9f, 0.9f}, 0));
   Material lamp = make_material(ProgramId::kEmissive);
@@ -274,7 +279,7 @@ TEST(ClosedForm, GlassInAConstantEnvironment) {
 
 // ---- estimators that must agree -----------------------------------------------------------------
 
-/// Direct light at the one point that the camera sees, by two independent estimators.
+/// Compares two independent estimators of direct light at the single point that the camera sees.
 struct DirectLight {
   Mean by_bsdf, by_light;
 };

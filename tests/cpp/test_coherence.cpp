@@ -42,7 +42,8 @@ TEST(Coherence, MaterialHomogeneity) {
 }
 
 TEST(Coherence, TextureHomogeneity) {
-  // Materials 0 and 1 share a texture, so only their texels differ.
+  // Materials 0 and 1 read the same texture, so only the texel positions of their records can
+  // differ.
   EXPECT_EQ(measure({0, 1, 0}, {5, 5, 5}).texture_homogeneity(), 1);
   EXPECT_EQ(measure({0, 1, 0}, {5, 5, 6}).texture_homogeneity(), 0.5);
   EXPECT_EQ(measure({0, 2}, {5, 5}).texture_homogeneity(), 0) << "another texture";

@@ -23,7 +23,7 @@ struct TestRay {
   float o[3], d[3];
 };
 
-/// A ray that passes a control point at `near` times its radius.
+/// Makes a ray that passes a control point at a distance of `near` times the radius of the point.
 TestRay aimed(const Mesh& mesh, std::mt19937& rng, float near) {
   const size_t point = rng() % mesh.vertex_count();
   const float reach = near * mesh.radii[point], scale = std::exp(2.f * uniform(rng));
@@ -48,8 +48,8 @@ bool enters(const Bounds& box, const TestRay& ray) {
   return from <= to;
 }
 
-/// Calls look(prim, may_hit, hits) for all segments. may_hit: the ray enters the box of the
-/// segment's BVH node.
+/// Calls look(prim, may_hit, hits) for all segments. `may_hit` says whether the ray enters the
+/// bounding box of the curve BVH node that contains the segment.
 template <typename Look>
 void compare(const Mesh& mesh, const CurveBvhNodes& nodes, const TestRay& ray, float tfar,
              const Look& look) {

@@ -66,7 +66,7 @@ struct Exact {
   }
 };
 
-/// Refines a local minimum of f on [0, 1] near sample i of n.
+/// Returns a local minimum of f on [0, 1], by refining the minimum near sample i of n.
 double refine(const std::function<double(double)>& f, int i, int n) {
   double a = std::max(0, i - 1) / static_cast<double>(n);
   double b = std::min(n, i + 1) / static_cast<double>(n);
@@ -80,8 +80,9 @@ double refine(const std::function<double(double)>& f, int i, int n) {
 constexpr double kMissed = 1e30;
 constexpr int kSamples = 1200;
 
-/// Smallest t > 0 at which a ray hits the union of the spheres around a segment, by dense samples
-/// of u: entry points are minima over u, exit points maxima.
+/// Returns the smallest t > 0 at which a ray hits the union of the spheres along a curve segment.
+/// The search samples the curve parameter u densely. Entry points are minima of t over u, and exit
+/// points are maxima.
 double brute_tube(const Exact& s, const V3& o, const V3& d) {
   double best = kMissed;
   for (const double side : {-1.0, 1.0}) {
@@ -95,7 +96,7 @@ double brute_tube(const Exact& s, const V3& o, const V3& d) {
     for (int i = 0; i <= kSamples; ++i) {
       if (at[i] == kMissed || (i > 0 && at[i] > at[i - 1]) || (i < kSamples && at[i] > at[i + 1]))
         continue;
-      // For exit points f is -z, so its minimum is the largest z.
+      // For exit points, f is -z, so the minimum of f is the largest z.
       const double z = -side * refine(f, i, kSamples);
       if (z > 0) best = std::min(best, z);
     }
@@ -103,7 +104,8 @@ double brute_tube(const Exact& s, const V3& o, const V3& d) {
   return best;
 }
 
-/// Smallest t > 0 on a ribbon, by sign changes between samples of u.
+/// Returns the smallest t > 0 at which a ray hits a ribbon, found by sign changes between dense
+/// samples of the curve parameter u.
 double brute_ribbon(const Exact& s, const V3& o, const V3& d) {
   const auto beside = [&](double u) { return dot(cross(sub(s.point(u), o), s.across(u)), d); };
   const auto meet = [&](double u) {
@@ -213,14 +215,14 @@ TEST(Curves, HitsEqualBruteForceInDoublePrecision) {
         }
       }
       EXPECT_GT(hits, rays / 3);
-      // Grazing rays, for which dense sampling and the solver may disagree about a hit; many rays
-      // graze ribbons.
+      // For grazing rays, dense sampling and the solver may disagree about whether there is a hit.
+      // Ribbons have many grazing rays, so their tolerance is larger.
       EXPECT_LE(differing, rays / (mesh.is_ribbon() ? 150 : 500))
           << static_cast<int>(primitive) << ", radius " << radius;
     }
 }
 
-/// First hit of a single ray.
+/// Nearest hit of a single ray.
 struct SingleRayHit {
   float t, u, v;
   uint32_t prim, geom, inst;
@@ -242,8 +244,8 @@ TEST(Curves, RaysThatLeaveDoNotHitWhatTheyLeave) {
   const auto random = [&] { return V3{uniform(rng), uniform(rng), uniform(rng)}; };
   for (const float away : {0.f, 50.f})
     for (const Primitive primitive : {Primitive::kLinearTube, Primitive::kSphere}) {
-      // Both shapes are convex: a ray that leaves one, however flat, does not hit it again, and a
-      // ray that enters it does.
+      // Linear tubes and spheres are convex. A ray that leaves the shape at any angle must not hit
+      // it again, and a ray that enters the shape must hit it.
       SceneBuilder b;
       const uint32_t group = b.add_group("one");
       CurveData data;
@@ -285,8 +287,8 @@ TEST(Curves, RaysThatLeaveDoNotHitWhatTheyLeave) {
 
 TEST(Curves, TubesHaveNoSeams) {
   const DenormalsOff denormals_off;
-  // A closed ring of four segments: a ray from inside hits the outer wall first and no inner
-  // surface of the segments before, and rays aimed at a seam from outside do not enter.
+  // Four curve segments form a closed ring. Rays from inside the tube must reach the outer surface
+  // without a hit inside, and rays from outside must not pass through the seams between segments.
   SceneBuilder b;
   CurveData ring;
   constexpr float k = 0.5522848f, r = 0.2f;
@@ -314,7 +316,7 @@ TEST(Curves, TubesHaveNoSeams) {
     const double phi = kPiD * uniform(rng), a = kPiD * uniform(rng);
     const V3 middle{std::cos(phi), std::sin(phi), 0};
     const V3 d = unit({uniform(rng), uniform(rng), uniform(rng)});
-    // Exit point of a torus of the same radii, which the ring matches within 1e-3.
+    // The ring deviates from a torus with the same radii by at most 1e-3.
     const SingleRayHit h = trace_one(accel, narrow(middle), narrow(d));
     ASSERT_EQ(h.inst, 0u) << "a hole";
     const V3 p = along(middle, d, h.t);

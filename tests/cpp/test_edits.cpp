@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Scene edits, copies, stop() and pick(): an edited scene equals a scene that is built anew.
+/// Tests of scene edits, copies, stop() and pick(). An edited scene must equal a newly built scene
+/// with the same values.
 #include <atomic>
 #include <chrono>
 #include <functional>
@@ -45,14 +46,15 @@ Values values() {
   return v;
 }
 
-/// Transforms for tests of moved meshes: the floor, the mesh with face materials (mirrored), the
-/// first ball and the panel.
+/// Transforms of four moved meshes: the floor, the mesh with face materials (which is mirrored),
+/// the first ball and the panel.
 struct Placing {
   Affine floor, cut, ball, panel;
 };
 
-/// Instances that inherit materials, a mesh with face materials, and a world mesh. With `placing`,
-/// world meshes become instances with the given transforms, after all other instances.
+/// Makes a scene with instances that inherit materials, a mesh with face materials, and a mesh of
+/// the world. If `placing` is not null, meshes of the world become instances with the given
+/// transforms, which follow all other instances.
 ScenePtr build(const Values& v, const Placing* placing = nullptr) {
   SceneBuilder b;
   const uint32_t sky = add_texture(b, 16, 8, 3, random_texels(16 * 8 * 3, 0.f, 1.5f, 4));
@@ -398,7 +400,8 @@ static_assert(
         std::is_same_v<CostProfile, decltype(std::declval<WavefrontRenderer&>().cost_profile())>,
     "another thread may replace them: callers get copies");
 
-/// Lets the thread sanitizer observe copies of vectors while another thread replaces them.
+/// Copies statistics while another thread replaces them, so that the thread sanitizer can detect
+/// races.
 TEST(Renderer, StatisticsAreReadWhileAnotherThreadRenders) {
   WavefrontRenderer renderer(cornell());
   Settings s = small();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Emission of light paths: uniform positions, cosine-weighted directions, the total power of the
-/// light, and the density that MIS uses where a camera path hits the light.
+/// Tests of the emission of light paths: uniform positions, cosine-weighted directions, total
+/// power, and the density that MIS uses when a camera path hits the light.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -120,7 +120,7 @@ TEST(Emission, OfPicturesIsThatOfTheirTexels) {
     lights.set = {};
     lights.build({light});
     const LightView view = sending(lights);
-    // A second estimate of the same power: uniform samples over the light.
+    // Estimate the same power a second time, with uniform samples over the surface of the light.
     double sum = 0, even = 0;
     constexpr int kPaths = 200000;
     for (int i = 0; i < kPaths; ++i) {
@@ -159,7 +159,7 @@ TEST(Emission, IsAsDenseAsWhoMeetsItIsTold) {
   }
 }
 
-/// Positions and directions are uniform after they are mapped to the unit square.
+/// Test that positions and directions, mapped to the unit square, are uniform.
 TEST(Emission, IsEvenOverLightsAndByCosine) {
   Random random(3);
   constexpr int kCells = 16, kPaths = 40000;
@@ -260,7 +260,8 @@ TEST(Emission, LightsThatDoNotShineOnAllAlikeSendNoPaths) {
       << "of a view that sends none";
 }
 
-/// Aimed light paths carry the same total power, and the same power through one of the spheres.
+/// Light paths that are aimed at spheres carry the same total power as other light paths, and the
+/// same power through one of the spheres.
 TEST(Emission, AimedCarriesTheSame) {
   Random random(11);
   constexpr int kPaths = 60000;

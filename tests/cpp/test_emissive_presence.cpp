@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Emissive triangles with partial presence: light samples, ray hits and selection probabilities.
-// Image tests: tests/statistics/test_emissive_presence.py.
+// Tests that compare images are in tests/statistics/test_emissive_presence.py.
 #include <functional>
 
 #include "lane_testing.h"
@@ -36,7 +36,8 @@ GraphOp op(GraphCode code, uint8_t width, uint16_t to, std::initializer_list<uin
   o.number = number;
   return o;
 }
-/// Makes a graph with components of `parameter` = coordinate `axis` of `input` + 0.5.
+/// Makes a value graph that sets each component of `parameter` to the coordinate `axis` of `input`,
+/// plus 0.5.
 Graph ramp(const char* parameter, uint16_t components, GraphInput input, uint16_t axis) {
   Graph g;
   g.constants = {0.5f};
@@ -48,13 +49,13 @@ Graph ramp(const char* parameter, uint16_t components, GraphInput input, uint16_
   return g;
 }
 
-/// A point on the triangle, computed independently of the code under test.
+/// Point on a triangle, computed without the code under test.
 struct Place {
   float u, v;
   Vec3<float> local;
 };
 
-/// A material and its expected values.
+/// Material of a test, with the expected values.
 struct Case {
   std::string name;
   std::function<void(SceneBuilder&, Material&)> set;
@@ -215,7 +216,7 @@ TEST(EmissivePresence, LightSamplesBringOpacityTimesEmission) {
         ASSERT_NEAR(s.weight.x * s.pdf, expected.x, 1e-4f) << what;
         ASSERT_NEAR(s.weight.y * s.pdf, expected.y, 1e-4f) << what;
         ASSERT_NEAR(s.weight.z * s.pdf, expected.z, 1e-4f) << what;
-        // MIS: the density of the direction does not depend on presence.
+        // For MIS, the density of a direction does not depend on presence.
         const float t = s.distance;
         const float pdf =
             triangle_light_pdf<float>(lights, lights.first_triangle, from, s.wi, t, true);
@@ -252,7 +253,7 @@ TEST(EmissivePresence, RaysMeetItAsOftenAsItsOpacitySays) {
                           keys)
                    ? 1
                    : 0;
-      // 156 comparisons with 4.5 standard errors each.
+      // There are 156 comparisons with a tolerance of 4.5 standard errors each.
       const double error = std::sqrt(opacity * (1 - opacity) / kPaths);
       EXPECT_NEAR(static_cast<double>(met) / kPaths, opacity, 4.5 * error + 1e-6) << one.name;
     }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Lobes of hair fibres in program "hair".
+/// Tests of the lobes of hair fibres in the program "hair".
 #include <gtest/gtest.h>
 
 #include <array>
@@ -54,7 +54,8 @@ std::vector<Look> looks() {
           {"tinted", 0.4f, 0.5f, {0.6f, 0.6f, 0.6f}, 3, {0.5f, 0.2f, 0.9f}, 0.8f, 1.2f}};
 }
 
-/// Returns wo for a fibre seen at the sine of theta and the offset h from its centre line.
+/// Returns the direction wo for the given sine of theta and the offset h of the hit from the centre
+/// line of the fibre.
 Vec seen_at(double sine, double h) {
   const double across = std::sqrt(1 - sine * sine);
   return {static_cast<float>(sine), static_cast<float>(across * h),
@@ -67,8 +68,8 @@ std::vector<Vec> views() {
   return all;
 }
 
-/// Directions as points of a chart: sin theta and the azimuth around the fibre; dw is the product
-/// of their differentials.
+/// Returns the direction of a chart point. The chart coordinates are sin theta and the azimuth
+/// around the fibre, so the chart preserves solid angle.
 Vec wi_at(const Place& p) {
   const double across = std::sqrt(std::max(0.0, 1 - p.x * p.x));
   return {static_cast<float>(p.x), static_cast<float>(across * std::sin(p.y)),
@@ -112,7 +113,8 @@ TEST(Fibre, ReflectsAllLightWithoutAbsorption) {
     const Hair bsdf = hair(look);
     for (const Vec& wo : views()) {
       if (!includes_case(index++, 5)) continue;
-      // Integrates by importance sampling, and by uniform directions, which do not use the density.
+      // Integrate once by importance sampling and once with uniform directions, which do not use
+      // the density.
       EXPECT_NEAR(furnace(bsdf, wo, 5000), 1, 0.005) << look.name << " " << wo.x << " " << wo.y;
       if (look.along < 0.2f) continue;
       double sum = 0, mass = 0;
@@ -144,8 +146,8 @@ TEST(Fibre, AbsorptionAndTintsTakeLight) {
   EXPECT_TRUE(is_black(s.weight));
 }
 
-// wo determines the offset h of the hit, so f is reciprocal only where both directions have the
-// same relation to it: theta_i = -theta_o, at the mirrored offset.
+// The direction wo determines the offset h of the hit on the fibre. Therefore f is reciprocal only
+// for pairs of directions with theta_i = -theta_o, evaluated at mirrored offsets.
 TEST(Fibre, IsReciprocalAsFarAsItsModelIs) {
   for (Look look : looks()) {
     look.tilt = 0;
@@ -166,7 +168,7 @@ TEST(Fibre, IsReciprocalAsFarAsItsModelIs) {
   }
 }
 
-// The lobes in double precision, by the formulas as printed in the papers.
+// Lobes in double precision, computed by the formulas of the papers.
 TEST(Fibre, LobesAreThoseOfThePaper) {
   const auto bessel = [](double x) {
     double sum = 0, term = 1;
@@ -190,8 +192,8 @@ TEST(Fibre, LobesAreThoseOfThePaper) {
             f(std::sin(a)), f(std::cos(a)), f(std::sin(b)), f(std::cos(b))));
         EXPECT_NEAR(ours, m, 2e-4 * m + 1e-12) << v << " " << a << " " << b;
       }
-  // Conversion of colour to absorption for one roughness by hand: 5.969 - 0.0645 + 0.22788 -
-  // 0.28971 + ...
+  // The divisor that converts colour to absorption, computed by hand for one roughness: 5.969 -
+  // 0.0645 + 0.22788 - 0.28971 + ...
   EXPECT_NEAR(fibre_color_divisor(0.3f), 5.88841, 1e-4);
   EXPECT_NEAR(fibre_variance(0.3f), 0.084611, 1e-5);
   EXPECT_NEAR(fibre_scale(0.3f), 0.1171598, 1e-6);
@@ -305,7 +307,8 @@ TEST(Fibre, AgreesWithMitsuba) {
   }
 }
 
-/// Inputs and results of a fibre, a view and a sample, as floats or packets.
+/// Number of inputs (fibre, view and random numbers) and of results of a test evaluation with
+/// floats or packets.
 constexpr size_t kGiven = 19, kFound = 12;
 
 template <typename F>

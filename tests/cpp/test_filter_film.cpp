@@ -22,18 +22,19 @@ struct FilterCase {
 const std::vector<FilterCase>& filters() {
   static const std::vector<FilterCase> all = {
       {FilterKind::kBox, "box", [](double) { return 1.0; }},
-      // sigma = width / 6 is 1 / 3 of the half width; shifted down to end at 0.
+      // The standard deviation is width / 6, which is 1/3 of the half width. A constant is
+      // subtracted so that the filter is 0 at its ends.
       {FilterKind::kGaussian, "gaussian",
        [](double x) { return std::exp(-x * x * 9 / 2) - std::exp(-9.0 / 2); }},
       {FilterKind::kBlackmanHarris, "Blackman-Harris", [](double x) {
-         // The 4-term Blackman-Harris window around its middle (F. Harris, 1978).
+         // The 4-term Blackman-Harris window, with its middle at x = 0 (F. Harris, 1978).
          return 0.35875 + 0.48829 * std::cos(kPiD * x) + 0.14128 * std::cos(2 * kPiD * x) +
                 0.01168 * std::cos(3 * kPiD * x);
        }}};
   return all;
 }
 
-/// Integral of x^power f(x) from -1 to `end`, by midpoints.
+/// Returns the integral of x^power f(x) from -1 to `end`, by the midpoint rule.
 double integral(const FilterCase& f, double end, int power = 0) {
   constexpr int kSteps = 20000;
   double sum = 0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Gaussian splats: hits against a search along the ray, positions, bounds, spherical harmonics,
-/// and invalid arrays.
+/// Tests of Gaussian splats: hits compared with a search along the ray, positions, bounds,
+/// spherical harmonics, and invalid arrays.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -18,7 +18,7 @@ using namespace curve_testing;
 
 using Double3 = std::array<double, 3>;
 
-/// Squared deviation (Mahalanobis distance) of a point from the centre of splat i.
+/// Returns the squared Mahalanobis distance of a point from the centre of splat i.
 double deviations(const GaussianSplatData& data, size_t i, const Double3& p) {
   const float* q = &data.orientations[4 * i];
   const double norm =
@@ -59,7 +59,7 @@ TEST(GaussianSplats, AreMetWhereTheirResponseIsGreatest) {
       return Double3{o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2]};
     };
     for (uint32_t i = 0; i < mesh.splats.size(); ++i) {
-      // Squared deviation is a parabola in t: ternary search finds its minimum.
+      // The squared Mahalanobis distance is a parabola in t, so ternary search finds its minimum.
       double lo = -20, hi = 20;
       for (int step = 0; step < 90; ++step) {
         const double a = lo + (hi - lo) / 3, b = hi - (hi - lo) / 3;
@@ -96,7 +96,8 @@ TEST(GaussianSplats, AreMetWhereTheirResponseIsGreatest) {
 }
 
 TEST(GaussianSplats, HarmonicsAreOrthonormal) {
-  // Exact for polynomials up to degree 6: midpoint rule in azimuth, Gauss rule along the axis.
+  // Use the midpoint rule in azimuth and a Gauss rule along the axis, which are exact for
+  // polynomials up to degree 6.
   constexpr double kNode[4] = {0.1834346424956498, 0.5255324099163290, 0.7966664774136267,
                                0.9602898564975363};
   constexpr double kWeight[4] = {0.3626837833783620, 0.3137066458778873, 0.2223810344533745,

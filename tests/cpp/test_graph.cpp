@@ -21,7 +21,8 @@ constexpr uint32_t kAllInputs = (1u << kInputCount) - 1;
 constexpr uint16_t kUvInput = static_cast<uint16_t>(GraphInput::kUv);
 constexpr uint16_t kFirstConstant = kGraphConstant;
 
-/// base_color = (u, v, noise), roughness = u - 4, normal = (u, 0, 1), film_thickness = 900 u.
+/// Makes a value graph with base_color = (u, v, noise), roughness = u - 4, normal = (u, 0, 1) and
+/// film_thickness = 900 u.
 Graph first_graph() {
   Graph g;
   g.constants = {4.f, 0.f, 1.f, 900.f};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Ranges of value graphs by interval arithmetic: results stay within their range, and features
-// outside of it are excluded from material variants.
+// Tests of the value ranges of graphs, which interval arithmetic computes. Results must stay within
+// their range, and material variants must leave out features that the range excludes.
 #include "wavecomb/graph/parameters/ranges.h"
 
 #include "range_testing.h"
@@ -11,8 +11,9 @@ namespace {
 
 using namespace range_testing;
 
-/// Range of register 8 after `ops`, with uv in [0, 1] and image `image` with values from 2 to 5,
-/// clamped to the range of specular_weight, [0, 100]. Constants: 0, 1, 2, -3, 0.25.
+/// Returns the value range of register 8 after `ops`. The inputs are uv in [0, 1] and the image
+/// `image` with values from 2 to 5. The range is clamped to the range of specular_weight, [0, 100].
+/// Constants: 0, 1, 2, -3, 0.25.
 ValueRange range_after(std::vector<GraphOp> ops, uint32_t image = 2) {
   Graph g;
   g.constants = {0.f, 1.f, 2.f, -3.f, 0.25f};
@@ -65,13 +66,14 @@ TEST(GraphRanges, FollowArithmetic) {
   expect_range(range_after({op(C::kAdd, 1, 6, {2, kMinus3}), op(C::kSqrt, 1, 8, {6})}), 0, 0);
   expect_range(range_after({op(C::kAdd, 1, 6, {2, k2}), op(C::kSqrt, 1, 8, {6})}), std::sqrt(2.f),
                std::sqrt(3.f));
-  // r + g + b of equal channels: a dot product has one result and does not write the next register.
+  // A dot product has a single result and does not write the next register.
   expect_range(range_after({op(C::kDot, 3, 8, {2, k1}, 1)}), 0, 3);
   expect_range(range_after({op(C::kCopy, 1, 8, {5}), op(C::kDot, 3, 7, {2, k0}, 1)}), 1, 1);
   expect_range(range_after({op(C::kSelect, 1, 8, {2, k1, k2})}), 1, 2);
   expect_range(range_after({op(C::kSelect, 1, 8, {5, k1, k2})}), 1, 1);
   expect_range(range_after({op(C::kSelect, 1, 8, {k0, k1, k2})}), 2, 2);
-  // Operations without known bounds may return anything; NaN becomes the minimum.
+  // Operations without known bounds may return any value, including NaN, which becomes the minimum
+  // of the range.
   expect_range(range_after({op(C::kExp, 1, 8, {2})}), 0, 100);
   expect_range(range_after({op(C::kMultiply, 1, 8, {0, k0})}), 0, 100);
   expect_range(range_after({op(C::kMax, 1, 8, {0, k2})}), 2, 100);
@@ -79,7 +81,8 @@ TEST(GraphRanges, FollowArithmetic) {
   expect_range(range_after({op(C::kClamp, 1, 8, {1, kQuarter, k2})}), 0.25f, 2);
 }
 
-/// Evaluates random graph programs at random points: no result leaves its range.
+/// Evaluates random graph programs at random points and checks that results stay within their
+/// ranges.
 TEST(GraphRanges, NoResultLeavesThem) {
   using C = GraphCode;
   constexpr C kCodes[] = {C::kAdd,   C::kSubtract, C::kMultiply, C::kMix, C::kMin,  C::kMax,

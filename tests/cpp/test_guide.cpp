@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The guiding field: equal-area map, tables, cells, and lookup.
+/// Tests of the guiding field: equal-area map of directions, tables, cells, and lookup.
 #include "wavecomb/guiding/lookup.h"
 
 #include "bsdf_testing.h"
@@ -22,14 +22,14 @@ using chi_square::Random;
 
 const GuidingGrid kUnitGrid({0.f, 0.f, 0.f}, {1.f, 1.f, 1.f});
 
-/// Makes a training bounce at (x, y, z) on a surface that faces `axis`, along w.
+/// Makes a training bounce in direction w from the point (x, y, z) of a surface that faces `axis`.
 TrainingRecord bounce(float x, float y, float z, uint8_t axis, const Vec3<float>& w,
                       float value = 1) {
   return {{x, y, z}, {w.x, w.y, w.z}, 0.f, 0, axis, value, 1.f, 1.f, 0.f, 1.f};
 }
 
-/// Makes bounces all over the unit cube. Bounces on surfaces that face axis k point roughly along
-/// axis k, more closely in the right half.
+/// Makes bounces that are distributed over the unit cube. Bounces on surfaces that face axis k have
+/// directions around axis k, with less spread in the right half of the cube.
 std::vector<TrainingRecord> many_bounces(uint32_t count, uint32_t seed) {
   Random random(seed);
   std::vector<TrainingRecord> records;
@@ -85,7 +85,7 @@ TEST(Guide, SphereMovesDirections) {
       const Vec3<float> w = octahedral_direction<float>(random(), random());
       const CentreDirection<float> seen = direction_from_centre<float>(offset, w);
       ASSERT_NEAR(length(seen.w), 1, 1e-5);
-      // The point on the sphere lies along w from the shading point.
+      // Test that the point on the sphere lies in direction w from the shading point.
       ASSERT_NEAR(length(cross(seen.w - offset, w)), 0, 1e-5);
       ASSERT_GT(dot(seen.w - offset, w), 0);
       ASSERT_NEAR(length(direction_from_point<float>(offset, seen.w) - w), 0, 1e-5);
@@ -105,14 +105,14 @@ TEST(Guide, SphereMovesDirections) {
     battery.run(c);
   }
   battery.judge();
-  // NaN, infinity, and coordinates that overflow.
+  // Test coordinates that are NaN or infinite, or that overflow.
   for (const float x : {kNan, kInf, 3e38f}) {
     const Vec3<float> o = sphere_offset<float>({x, 0.f, 0.f}, {0.f, 0.f, 0.f}, 3e38f);
     EXPECT_TRUE(length(o) < 0.71f || std::isnan(x)) << x;
   }
 }
 
-/// A lamp 20 cm wide, a few metres from a wall, and a region of two metres of that wall: directions
+/// A small lamp is near a region of a wall. Seen from different points of this region, directions
 /// to the lamp differ by 50 degrees.
 TEST(Guide, SpheresKnowHowFarLightIs) {
   Random random(13);
@@ -122,7 +122,8 @@ TEST(Guide, SpheresKnowHowFarLightIs) {
   for (int i = 0; i < 2000; ++i) {
     const Vec3<float> p = guiding(), d = lamp - p;
     records.push_back(bounce(p.x, p.y, p.z, 2, normalize(d)));
-    // At half the distance, the light comes through a hole at the lamp's position.
+    // The recorded distance is twice the distance to the lamp, as for light from farther away that
+    // arrives through a hole at the position of the lamp.
     records.back().inverse_distance = 0.5f / length(d);
   }
   const GuidingField field(kUnitGrid, records, 1, true, true, size_t{64} << 20);
@@ -147,7 +148,8 @@ TEST(Guide, SpheresKnowHowFarLightIs) {
   EXPECT_GT(known, taken_for_far + std::log(2.0));
 }
 
-/// Blurred bins keep their sum, fill holes near observed directions, and add nothing far away.
+/// Blurring bins keeps their sum, fills holes near observed directions, and does not change bins
+/// far away.
 TEST(Guide, DirectionsAreBlurred) {
   Random random(14);
   for (int round = 0; round < 50; ++round) {
@@ -265,7 +267,8 @@ TEST(Guide, FewBouncesLeanOnWhatIsAround) {
   EXPECT_FALSE(look_up_guiding<float>(empty.view(), {0.5f, 0.5f, 0.5f}, 0, 0, true).guided);
 }
 
-/// The survival factor of a region by its formula, including bounces without contribution.
+/// Compares the survival factor of a region with the formula. Bounces without contribution count,
+/// too.
 TEST(Guide, BouncesAreWeighed) {
   std::vector<TrainingRecord> records;
   for (int i = 0; i < 1000; ++i) records.push_back(bounce(0.5f, 0.5f, 0.5f, 2, {0.f, 1.f, 0.f}, 4));
@@ -273,7 +276,7 @@ TEST(Guide, BouncesAreWeighed) {
   const uint64_t at = bounce_position_key(kUnitGrid, {0.5f, 0.5f, 0.5f}, 2);
   std::vector<BounceSample> training_samples(3000, {at, 0.f, 0.f, 2.f});
   training_samples.insert(training_samples.end(), 1000, {at, 4.f, 16.f, 6.f});
-  // Cells contain no training samples of surfaces that face another axis.
+  // Training samples of surfaces that face another axis must not count.
   training_samples.insert(training_samples.end(), 10,
                           {bounce_position_key(kUnitGrid, {0.1f, 0.1f, 0.9f}, 3), 9.f, 81.f, 1});
   field.compute_survival(training_samples, {27, 0.5});
@@ -313,7 +316,7 @@ TEST(Guide, SharesFollowMoments) {
   EXPECT_EQ(kBsdfShares[bad.best()], 1.f);
   EXPECT_EQ(none.count, 0);
   EXPECT_EQ(kBsdfShares[none.best()], 1.f);
-  // Where the guiding field does not reduce noise, no bounces are guided.
+  // Regions in which the guiding field does not reduce noise are not guided.
   std::vector<TrainingRecord> records = many_bounces(50000, 9);
   for (TrainingRecord& r : records) r.guiding_pdf = 1e-3f;
   const GuidingField field(kUnitGrid, records, 1, false, true, size_t{64} << 20);
@@ -331,7 +334,7 @@ TEST(Guide, SharesFollowMoments) {
 }
 
 /// A guiding field that is restored from its arrays is equal to the original. The constructor
-/// refuses arrays that would mislead kernels.
+/// throws Error for arrays with invalid indices or values.
 TEST(Guide, IsMadeOfItsPartsAgain) {
   const auto records = many_bounces(80000, 11);
   // The grid is so large that all samples fall into few top-level entries, which are divided.

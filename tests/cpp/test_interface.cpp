@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Diffuse bases under a rough interface, compared with integrals in double precision.
+/// Tests of diffuse bases below a rough interface, compared with double-precision integrals.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -34,8 +34,8 @@ Crossing exact(double c, double eta) {
   return {0.5 * (p * p + s * s), t};
 }
 
-/// Albedos of reflection and transmission of a GGX interface for one bounce at cosine z: means of
-/// G2 / G1 over visible normals. Independent of the code under test.
+/// Single-bounce albedos of reflection and transmission of a GGX interface at cosine z, computed as
+/// means of G2 / G1 over visible normals. Does not use the code under test.
 struct Albedo {
   double reflected, transmitted;
 };
@@ -78,7 +78,8 @@ void expect_base(Params p, const char* name, bool schlick, double f0, double bac
     const double e = albedo(z, alpha, static_cast<double>(p.ior), schlick, f0).reflected;
     for (const float base : {0.f, 0.2f, 1.f}) {
       p.base_color = Vec(base);
-      // The base receives the transmitted light, which leaves through the interface once.
+      // The base reflects the transmitted light, and all of this light leaves through the
+      // interface.
       const double expected = e + static_cast<double>(base) * (1 - e);
       const double found = furnace(Bsdf(p, schlick), direction(z, 0.4), 10000);
       EXPECT_GE(found, expected - 0.008)
@@ -96,7 +97,8 @@ TEST(RoughInterface, DiffuseBasesHaveWhatItLeaves) {
       p.roughness = r;
       p.ior = ior;
       expect_base<PlasticBsdf<float>>(p, "plastic", false, 0, 0);
-      // Principled compensates for multiple scattering, a fraction of the squared reflectance.
+      // The program "principled" adds light for multiple scattering, which is a fraction of the
+      // squared reflectance.
       expect_base<PrincipledBsdf<float>>(p, "principled", false, 0, 0.012);
     }
 }
@@ -111,7 +113,8 @@ TEST(RoughInterface, SchlicksTooWhereItIsAskedFor) {
 }
 
 TEST(RoughInterface, WhiteUnderAnySpecularColorIsWhite) {
-  // A white base under a grey mirror of 0.5: the fit of lost energy is at most 2 % too low.
+  // A white base is below a specular layer of reflectance 0.5. The fit of the lost energy is at
+  // most 2 % too low.
   for (const float r : kRoughnesses) {
     Params p = plain_params();
     p.roughness = r;

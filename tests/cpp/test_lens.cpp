@@ -24,7 +24,8 @@ Camera distorting(float k1, float p1 = 0) {
   return camera;
 }
 
-/// Image position of the point (x, y) at distance 1 in the distortion model; y points down.
+/// Returns the image position that the distortion model gives for the point (x, y) at distance 1.
+/// Image y points down.
 std::array<double, 2> shown(const Camera& c, double x, double y) {
   const double r2 = x * x + y * y;
   const double radial = 1 + r2 * (double{c.lens_k1} + r2 * double{c.lens_k2});

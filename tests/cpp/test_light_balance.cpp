@@ -11,16 +11,16 @@
 namespace wavecomb {
 namespace {
 
-/// Selection probability (share) of a part of the lights, and two ratios at each vertex that
-/// selected it: contribution g and bounce density b, each divided by the density q of the light
-/// sample.
+/// Samples of one part of the lights: the selection probability ("share") of the part, and a pair
+/// of values for each vertex that selected the part. The pair is the contribution and the bounce
+/// density, each divided by the density of the light sample.
 struct Samples {
   double share;
   std::vector<std::pair<double, double>> found;
 };
 
-/// Returns the shares for identical vertices, where each part is chosen in proportion to its share
-/// and has the same number of samples.
+/// Returns the balanced shares for identical vertices that choose each part in proportion to its
+/// share.
 std::vector<double> balanced(const std::vector<Samples>& parts, const std::vector<double>& power) {
   std::vector<double> shares;
   for (const Samples& part : parts) shares.push_back(part.share);
@@ -57,15 +57,16 @@ TEST(LightBalance, IsTheSquareRootOfTheSecondMoment) {
 TEST(LightBalance, WhatBouncesFindHasTheFloor) {
   const std::vector<double> power{0.8, 0.2};
   const double floor = LightBalance::kFloor * (0.25 + 0.4);
-  // Tests uniform domes, dimmer and brighter than the light. The contribution of a dome sample is
-  // the radiance times the bounce density, and half of the dome is below the horizon.
+  // Tests uniform domes that are dimmer or brighter than the second light. The contribution of a
+  // dome sample is the radiance times the bounce density, and half of the dome is below the
+  // horizon.
   for (const double radiance : {0.05, 0.5, 2.0}) {
     const auto shares =
         balanced({{0.6, {{radiance * 2, 2}, {0, 0}}}, {0.4, {{0.5, 0.01}, {0.5, 0.01}}}}, power);
     EXPECT_NEAR(shares[0], floor, 0.005) << radiance;
     EXPECT_NEAR(shares[0] + shares[1], 1, 1e-12);
   }
-  // A dome with a sun, which bounces do not find, gets a larger share.
+  // A dome with a sun gets a larger share, since bounces rarely hit the sun.
   EXPECT_GT(balanced({{0.6, {{0.4, 2}, {30, 0.001}}}, {0.4, {{0.5, 0.01}, {0.5, 0.01}}}}, power)[0],
             0.5);
 }

@@ -44,7 +44,7 @@ TEST(LightBuilder, FlatLightsShineToTheImageOfMinusZ) {
     expect_vec(only(Lights({make_light(kind, scale(-1, 1, 1))})).n, 0, 0, -1);
     expect_vec(only(Lights({make_light(kind, scale(1, 1, -1))})).n, 0, 0, 1);
     expect_vec(only(Lights({make_light(kind, rotate(90, 0))})).n, 0, 1, 0);
-    // A shear parallel to the plane does not change it.
+    // A shear parallel to the plane of the light does not change the light.
     const Affine shear{{{1, 0, 5}, {0, 1, 0}, {0, 0, 1}}, {0, 0, 0}};
     expect_vec(only(Lights({make_light(kind, shear)})).n, 0, 0, -1);
   }
@@ -72,7 +72,7 @@ TEST(LightBuilder, NormalizedLightsKeepTheirPower) {
       EXPECT_NEAR(static_cast<double>(only(lights).radiance[0]) * only(lights).area, 2, 1e-4);
     }
   }
-  // Small normalised spheres approach the point light: intensity pi r^2 L.
+  // A small normalised sphere light approaches a point light of intensity pi r^2 L.
   Light light = make_light(LightKind::kSphere);
   light.normalize = true;
   light.radius = 1e-3f;
@@ -154,7 +154,8 @@ TEST(LightBuilder, ProbabilitiesFollowPower) {
 }
 
 TEST(LightBuilder, PickPdfIsExact) {
-  // Counts every possible value of u_light, with no other light, a weak one and a strong one.
+  // Counts selections for every possible value of the random number, with no other light, with a
+  // weak light, and with a strong light.
   for (const auto& [n, records, color] : {std::tuple{1u, 0u, 1.f},
                                           {2u, 0u, 1.f},
                                           {3u, 1u, 1e-9f},
@@ -218,19 +219,19 @@ TEST(LightBuilder, PickTableOfMillions) {
 }
 
 TEST(LightBuilder, FewStrongLightsHaveASmallTable) {
-  // A dome next to a million triangles: the selection table stays small.
+  // The selection table stays small for a dome and a million triangles.
   std::vector<double> weights(1000001, 1);
   weights[0] = 1e6;
   std::vector<uint32_t> bins, numbers;
   const PowerTable table = build_power_table(weights, 1, bins, numbers);
-  // Half of the power is expected; 1 % of it is distributed equally among lights. The tolerance is
-  // one unit of the bins.
+  // The dome has half of the power, and 1 % of the probability is distributed equally among all
+  // lights. The tolerance is the size of one table bin.
   EXPECT_NEAR(numbers[0], 0.99 * 0x1p24 / 2, 1 << 14);
   EXPECT_EQ(table.split, numbers[0]);
   EXPECT_LE(table.triangle_bins, 1024u);
 }
 
-/// The density of dome samples is positive wherever the bilinear image is.
+/// The density of dome samples is positive wherever the bilinearly filtered image is positive.
 TEST(DomeDistribution, PositiveWhereverTheBilinearImageIs) {
   std::mt19937 rng(3);
   const uint32_t sizes[][2] = {{1, 1},   {2, 1},      {8, 4},      {17, 9},
@@ -289,7 +290,7 @@ const uint16_t* values_of(const Distribution2D& d, uint32_t row) {
   return d.cumulative[size_t{row} * d.row_lines].value;
 }
 
-/// Expects find_interval to agree with a search of the whole row.
+/// Expects find_interval() to return the same result as a linear search of the row.
 template <typename F>
 void expect_intervals(const Distribution2D& d, uint32_t row, uint32_t n,
                       const std::vector<uint32_t>& counts) {
@@ -312,8 +313,8 @@ void expect_intervals(const Distribution2D& d, uint32_t row, uint32_t n,
   }
 }
 
-/// Tests counts at and next to cumulative values (all, or a few hundred of them), and random
-/// counts, padded to a multiple of 16.
+/// Returns values to look up: cumulative values and their neighbours, and random values. Pads the
+/// list to a multiple of 16.
 std::vector<uint32_t> hard_counts(const uint16_t* cumulative, uint32_t n, std::mt19937& rng) {
   std::vector<uint32_t> x;
   const auto add = [&](uint32_t count) {

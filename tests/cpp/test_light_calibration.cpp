@@ -85,8 +85,8 @@ TEST(LightCalibration, GivesSharesToWhatLights) {
   EXPECT_GT(share_of(shares, "Key"), 0.6);
   EXPECT_LT(share_of(shares, "Dome"), 0.1);
   EXPECT_GT(share_of(shares, "Fill"), share_of(shares, "Glow"));
-  // The light below the floor has the most power but illuminates nothing visible: it gets the
-  // minimum share.
+  // The light below the floor has the most power but illuminates no visible surface, so it gets the
+  // minimum selection probability.
   double by_power = 0;
   for (const LightShare& part : shares.parts)
     if (part.name == "Below") by_power = part.by_power;
@@ -145,7 +145,8 @@ TEST(LightCalibration, IsKeptUntilItIsAnother) {
   expect_same(first, again, "again");
   s.width = 40;
   EXPECT_FALSE(shares_of(renderer, s).kept);
-  // An edited scene calibrates like a scene built with the edit.
+  // Calibration gives the same result for an edited scene and for a scene built with the same
+  // values.
   Light key = renderer.scene()->lights()[1];
   ASSERT_EQ(key.name, "Key");
   key.color = {2, 2, 2};

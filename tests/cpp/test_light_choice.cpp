@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Lights are selected with the stated probabilities: by power, by calibrated shares, by the light
-/// tree, and by the tree with shares and calibrated nodes.
+/// Tests that lights are selected with the probabilities that the renderer computes: by power, by
+/// calibrated shares, by the light tree, and by the tree with shares and calibrated nodes.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -25,8 +25,8 @@ float stated(const LightView& view, uint32_t light, const LightReceiver<float>& 
                                      : view.triangles[light - view.first_triangle].selection_pdf;
 }
 
-/// Counts selections for receiver `to`. The last cell counts no selection; lights that cannot be
-/// selected have no cell.
+/// Counts how often each light is selected for a receiver. The last cell counts no selection;
+/// lights that cannot be selected have no cell.
 void count(Battery& battery, const std::string& name, const LightView& view,
            LightReceiver<float> to, uint32_t seed) {
   const size_t samples = chi_square::usual_samples();
@@ -51,8 +51,8 @@ void count(Battery& battery, const std::string& name, const LightView& view,
   battery.add(name, chi_square::p_of_counts(observed, expected));
 }
 
-/// Puts each light record into a separate part, and the triangles, or the whole tree, into another
-/// one.
+/// Puts each light record into a separate part. Puts all triangle lights, or all lights of the
+/// tree, into one more part.
 LightParts parts_of(const LightSet& set, bool by_tree) {
   LightParts parts;
   parts.by_tree = by_tree;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Cylinders, shaping and IES profiles: compared with surface integrals and values computed by
-/// hand.
+/// Tests of cylinder lights, shaping and IES profiles, compared with surface integrals and with
+/// values computed by hand.
 #include <numbers>
 
 #include "lane_testing.h"
@@ -11,7 +11,7 @@ namespace {
 
 using namespace light_testing;
 
-/// Irradiance on a surface at `from` with normal n, by n x n midpoints.
+/// Returns the irradiance at the point `from`, by the midpoint rule with n x n points.
 double irradiance(const Lights& lights, const Vec3<float>& from, const Vec3<float>& n,
                   int grid = 600) {
   const LightView view = lights.view();
@@ -95,9 +95,9 @@ TEST(Cylinder, IrradianceIsTheSumOverItsSurface) {
 }
 
 TEST(Cylinder, PlacesAlongALineOfItAreNotRounded) {
-  // Seen from 0.01 above a line of the cylinder, two lengths away, all sines of the inclination
-  // differ from 1 by only about 1e-6, 30 float steps. A naive formula places samples 0.05 apart and
-  // up to 0.03 beside the light.
+  // The receiver is 0.01 above the extension of a line of the cylinder, two lengths away. All sines
+  // of the inclination then differ from 1 by only about 1e-6. A naive formula rounds sample
+  // positions to steps of 0.05 and places some of them 0.03 outside the light.
   Light light = make_light(LightKind::kCylinder);
   light.length = 2;
   const Lights lights({light});
@@ -147,8 +147,8 @@ TEST(Cylinder, NormalizeKeepsItsPower) {
   }
 }
 
-/// Radiant intensity of a shaped point light at the origin along `dir`, for an unshaped intensity
-/// of 3 in green and 2 in red.
+/// Returns the radiant intensity in direction `dir` of a point light with shaping at the origin.
+/// Without shaping, the intensity would be 3 in green and 2 in red.
 Color<float> sent(const Shaping& shaping, Vec3<float> dir, const Affine& turned = {},
                   std::vector<IesProfile> profiles = {}) {
   Light light = make_light(LightKind::kSphere, turned);
@@ -197,7 +197,8 @@ TEST(Shaping, ConeIsHardOrSmooth) {
   EXPECT_EQ(sent(hard, {-1, 0, 0}, rotate(0, -90) * scale(3, 2, 5)).y, 0);
 }
 
-/// Two planes of 3 angles: 8 candela on the axis, decreasing outwards.
+/// IES profile with two planes of 3 angles. The intensity is 8 candela on the axis and decreases
+/// outwards.
 IesProfile lamp() {
   return {{0, 30, 90}, {0, 90, 360}, {8, 6, 0, 8, 2, 1, 8, 6, 0}};
 }
@@ -225,8 +226,8 @@ TEST(Ies, BilinearBetweenItsAngles) {
 }
 
 TEST(Ies, ScaledBeyondItsEnds) {
-  // As in OpenUSD's reference implementation: beyond 180 degrees a profile keeps its last value,
-  // below 0 it is dark.
+  // As in OpenUSD's reference implementation, scaled angles beyond 180 degrees have the last value
+  // of the profile, and scaled angles below 0 have intensity 0.
   const auto candela = [&](double theta, float angle_scale, const IesProfile& profile) {
     Shaping shaping{0, {}, 180, 0, 0};
     shaping.ies_angle_scale = angle_scale;
@@ -242,7 +243,7 @@ TEST(Ies, ScaledBeyondItsEnds) {
   EXPECT_NEAR(candela(135, -0.5f, all_around), 2, 1e-3);  // 2 theta - 180
   for (const double theta : {1.0, 45.0, 89.0})
     EXPECT_EQ(candela(theta, -0.5f, all_around), 0) << theta;
-  // Directions outside of the profile's range stay dark.
+  // The intensity is 0 outside the angle range of the profile.
   const IesProfile downwards{{0, 90}, {0}, {1, 2}};
   EXPECT_NEAR(candela(22.5, 0.5f, downwards), 1.5, 1e-3);
   for (const double theta : {46.0, 91.0, 120.0, 179.0})
@@ -250,11 +251,11 @@ TEST(Ies, ScaledBeyondItsEnds) {
 }
 
 TEST(Ies, MeanIsExactAndNormalizes) {
-  // Spherical mean of a profile that is linear in theta from 1 to 0: 1/2 integral sin (1 - theta /
-  // pi) = 1 / 2.
+  // A profile that falls linearly from 1 at theta = 0 to 0 at theta = pi has the spherical mean 1/2
+  // integral sin theta (1 - theta / pi) = 1 / 2.
   EXPECT_NEAR((IesProfile{{0, 180}, {0}, {1, 0}}).mean(), 0.5, 1e-12);
-  // The mean of a profile that is linear from 1 to 0 over a hemisphere is the integral of sin (1 -
-  // 2 theta / pi) = 1 - 2 / pi.
+  // For a profile that falls linearly from 1 to 0 over a hemisphere, the mean over the hemisphere
+  // is the integral of sin theta (1 - 2 theta / pi), which is 1 - 2 / pi.
   EXPECT_NEAR((IesProfile{{0, 90}, {0}, {1, 0}}).mean(), 1 - 2 / kPiD, 1e-12);
   EXPECT_NEAR((IesProfile{{0, 90, 180}, {0, 360}, {5, 5, 5, 5, 5, 5}}).mean(), 5, 1e-6);
   Shaping shaping{0, {}, 180, 0, 0};

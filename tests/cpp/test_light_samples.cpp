@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Samples of every kind of light follow the density that MIS uses for hits, seen from several
-/// points. For sets of lights, selection and position are tested together.
+/// Tests that samples of every kind of light follow the density that MIS uses when a ray hits the
+/// light. The receivers are at several points. With several lights, the selection of the light and
+/// the position on the light are tested together.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -46,9 +47,9 @@ TEST(LightSamples, OfRectsAndDisksFollowTheirDensity) {
 }
 
 TEST(LightSamples, RectsSeenVeryFlatKeepTheirFarEdge) {
-  // For a rect 60 to 100 times as far away as the point is above its plane, the cosine used to
-  // place a sample along its width is within 1e-4 of 1. A computation by that cosine rounded
-  // positions to 3e-4 of the width and moved 0.13 % of the samples to the far edge.
+  // The distance to the rect is 60 to 100 times the height of the receiver above its plane. The
+  // cosine from which the position of a sample is computed is then within 1e-4 of 1. A simple
+  // formula rounded positions to 3e-4 of the width and moved 0.13 % of the samples to the far edge.
   const Lights lights({make_light(LightKind::kRect, scale(2, 3, 1))});
   const chi_square::Case c = light_case("flat", lights.view(), Vec3<float>(4, 1, -0.05f));
   chi_square::Random random(3);
@@ -108,7 +109,7 @@ TEST(LightSamples, OfInfiniteLightsFollowTheirDensity) {
     see(battery, "distant of " + std::to_string(angle), distant, anywhere);
   }
   see(battery, "dome", make_light(LightKind::kDome), anywhere);
-  // A portal in front of the room and one at its side; the room is at z < 1.
+  // The room is at z < 1. One portal is in front of the room, and one is at its side.
   const From rooms[] = {{"in the room", {0, 0, 0}},
                         {"at the window", {0.3f, 0.1f, 0.96f}},
                         {"beside the window", {3, 0.1f, 0.8f}},

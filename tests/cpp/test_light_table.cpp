@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The table of light parameters: its rows, and the checks and fingerprint derived from it.
+/// Tests of the table of light parameters: its rows, and the checks and the fingerprint that the
+/// code derives from the table.
 #include "wavecomb/light/description/light_table.h"
 
 #include <gtest/gtest.h>
@@ -28,7 +29,7 @@ Light a_light(LightKind kind = LightKind::kRect) {
   return light;
 }
 
-/// Returns the error message about the light, or "".
+/// Returns the error message of the checks of a light, or an empty string if the light is valid.
 template <typename Change>
 std::string said(const Change& change, const LightReferences& there = kThere) {
   Light light = a_light();
@@ -41,7 +42,7 @@ std::string said(const Change& change, const LightReferences& there = kThere) {
   return "";
 }
 
-/// Returns a valid value of the row other than its default.
+/// Returns a valid value of a parameter that differs from its default.
 LightValue another(const LightParameter& p) {
   switch (p.kind) {
     case LightValueKind::kNumber:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Light selection by tree: probabilities, bounds, and agreement of packets with scalars.
-/// test_light_choice.cpp tests frequencies.
+/// Tests of light selection by the light tree: probabilities, bounds, and equal results of packets
+/// and scalar lanes. test_light_choice.cpp tests the selection frequencies.
 #include "wavecomb/light/sampling/tree_choice.h"
 
 #include <chrono>
@@ -27,8 +27,8 @@ TEST(LightTree, ProbabilitiesAddUpToOne) {
         const LightReceiver<float> to = random_receiver(number);
         double sum = 0;
         for (uint32_t i = 0; i < view.count; ++i) sum += double{selection_pdf(view, i, to)};
-        // Bounds shrink on the way down, so some sample values end at nodes where no light
-        // contributes, and no light is selected.
+        // Bounds become tighter towards the leaves, so some random numbers lead to nodes in which
+        // no light contributes. In that case, no light is selected.
         double none = 0;
         constexpr int kTries = 400;
         for (int i = 0; i < kTries; ++i) {
@@ -57,8 +57,8 @@ TEST(LightTree, ProbabilitiesAddUpToOne) {
   }
 }
 
-/// Every light that contributes at a receiver can be selected. A point on the light's front side
-/// above the receiver's horizon shows that the light contributes.
+/// Every light that contributes at a receiver can be selected. A light contributes if a light
+/// sample above the horizon of the receiver is valid.
 TEST(LightTree, WhatShinesCanBeChosen) {
   const Lights lights = random_lights(300, 8);
   const LightView power = lights.view(), view = by_tree(lights);
@@ -84,8 +84,8 @@ TEST(LightTree, WhatShinesCanBeChosen) {
   }
 }
 
-/// The light density that MIS uses for bounces equals the density of light samples, and estimates
-/// agree with selection by power.
+/// The light density that MIS uses for bounces equals the density of light samples. Estimates with
+/// the light tree agree with estimates with selection by power.
 TEST(LightTree, BothHalvesOfMisAgree) {
   const Lights lights = random_lights(200, 14, 2);
   const LightView power = lights.view(), view = by_tree(lights);
@@ -125,8 +125,7 @@ TEST(LightTree, BothHalvesOfMisAgree) {
       mean[way] = sum / kSamples;
       error2[way] = (sum2 / kSamples - mean[way] * mean[way]) / kSamples;
     }
-    // Both probabilities are 0 where no light arrives. Draw the random numbers in separate
-    // statements: compilers may evaluate arguments in any order, so positions would differ.
+    // Where no light arrives, both estimates are 0.
     EXPECT_LE(std::abs(mean[0] - mean[1]), 4.5 * std::sqrt(error2[0] + error2[1])) << k;
     for (int way = 0; way < 2; ++way) variance[way] += error2[way] / (mean[0] * mean[0] + 1e-12);
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Lights: both techniques of MIS, closed forms of irradiance, textured lights, and lanes.
-/// test_light_samples.cpp has the chi-square tests.
+/// Tests of lights: both sampling techniques of MIS, closed forms of irradiance, textured lights,
+/// and packets. test_light_samples.cpp contains the chi-square tests.
 #include "wavecomb/light/sampling/light_sample.h"
 
 #include <functional>
@@ -16,7 +16,8 @@ using namespace light_testing;
 using lane_testing::kInf;
 using lane_testing::kNan;
 
-/// Density that MIS uses for direction `dir` from `from`, for a set with one light.
+/// Returns the light density that MIS uses for the ray from `from` along `dir`, for a set with one
+/// light.
 float density(const Lights& lights, const Vec3<float>& from, const Vec3<float>& dir) {
   const LightView view = lights.view();
   if (view.first_triangle == 0) {
@@ -117,7 +118,8 @@ TEST(LightSampling, HitDensityIsTheSamplingDensity) {
         ++outside;
         continue;
       }
-      // The weight of a light sample times its pdf is the radiance, which a hit returns as well.
+      // The weight of a light sample times its pdf is the radiance of the light, which is 3 here
+      // and equals the radiance of a hit.
       if (!is_dome_image) {
         ASSERT_NEAR(s.weight.y * s.pdf, 3, 1e-5);
       }
@@ -169,7 +171,8 @@ TEST(LightSampling, BothHalvesOfMisSumTo1) {
   EXPECT_EQ(balance_weight(1.f, kInf), 0.f);
 }
 
-/// Irradiance on a surface at `from` with normal n, by n x n jittered samples.
+/// Returns the irradiance at the point `from` of a surface with the given normal, by jittered
+/// samples.
 double irradiance(const Lights& lights, const Vec3<float>& from, const Vec3<float>& n,
                   int grid = 700) {
   const LightView view = lights.view();
@@ -215,7 +218,7 @@ TEST(Irradiance, DiskAboveAPoint) {
 }
 
 TEST(Irradiance, SphereNearAndFar) {
-  // E = pi L (r / d)^2 cos for a sphere entirely above the horizon.
+  // For a sphere entirely above the horizon, E = pi L (r / d)^2 cos theta.
   for (const double distance : {1.001, 2.0, 100.0, 1e5}) {
     for (const double tilt : {0.0, 0.4}) {
       const double cosine = std::cos(tilt);
@@ -268,7 +271,7 @@ TEST(Irradiance, Domes) {
   constant.build({dome});
   EXPECT_NEAR(irradiance(constant, kOrigin, kUp), 1.5 * kPiD, 0.01);
 
-  // An image with a sun; the reference integrates radiance over the sphere.
+  // The dome image contains a sun. The reference value is an integral of radiance over the sphere.
   std::mt19937 rng(77);
   std::vector<float> rgb(32 * 16 * 3);
   for (float& x : rgb) x = static_cast<float>(rng() % 100) / 100.f;
@@ -335,7 +338,7 @@ TEST(TexturedLights, RectShowsItsImageUprightFromTheFront) {
   EXPECT_EQ(
       light_hit<float>(lights.view(), 0u, Vec3<float>{0, 0, 1}, {0, 0, -1}, 1.f, true).radiance.y,
       0);
-  // Samples have the radiance of a hit at the same position.
+  // Light samples have the same radiance as hits at the same position.
   std::mt19937 rng(2);
   for (int i = 0; i < 1000; ++i) {
     const auto s = sample_light<float>(lights.view(), Vec3<float>{0.1f, 0.2f, -1}, 0.f,

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Size limits that are too large for a test to reach with real data.
+/// Tests of size limits. Scenes at these limits would be too large for a test, so the tests pass
+/// only counts.
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -33,8 +34,8 @@ struct Limit {
 };
 
 TEST(Limits, scene_counts_end_where_words_do) {
-  // The offset of the last record in 32-bit words stays below 2^31, that of the last row below
-  // 2^32.
+  // In 32-bit words, the offset of the last record must be below 2^31, and the offset of the last
+  // row must be below 2^32.
   const Limit limits[] = {
       {&SceneCounts::meshes, 134217728, "134,217,729 meshes"},
       {&SceneCounts::materials, (1ull << 31) / (kInputCount * 16), "materials"},
@@ -193,7 +194,7 @@ TEST(Limits, lights_are_numbered_to_the_last) {
   EXPECT_EQ(refusal([] { check_light_count(uint64_t{kMaxLights} + 1); }),
             "the scene has 268,435,457 lights and emissive triangles; 268,435,456 can be numbered; "
             "give meshes that emit fewer triangles or instances");
-  // The count must not be truncated to 32 bits.
+  // Test that a count above 2^32 is not truncated to 32 bits.
   EXPECT_NE(refusal([] { check_light_count((uint64_t{1} << 32) + 5); }), "");
 }
 

@@ -28,7 +28,7 @@ Affine facing_down(float y) {
 Light disk(float y = 1) {
   return make_light(LightKind::kDisk, {3, 3, 3}, facing_down(y));
 }
-/// Irradiance of disk() at the point below its centre.
+/// Irradiance from the disk light disk() at the point below its centre.
 constexpr double kUnderDisk = kPiD * 3 * 0.25 / 1.25;
 
 uint32_t add_mesh(SceneBuilder& b, MeshData data, uint32_t material, const char* name) {
@@ -54,7 +54,7 @@ Material grey() {
   return make_material(ProgramId::kDiffuse, {0.6f, 0.6f, 0.6f});
 }
 
-/// Renders by waves and expects the image of the reference integrator.
+/// Renders a scene with waves and with the reference integrator, and expects equal images.
 RenderedImage checked(const ScenePtr& scene, const Settings& s) {
   WavefrontRenderer renderer(scene);
   RenderedImage waves = renderer.render(s);

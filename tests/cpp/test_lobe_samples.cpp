@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Samples of single lobes, normals or directions, follow their densities, without selection among
-/// lobes.
+/// Tests that samples of single lobes (normals or directions) follow their densities. The selection
+/// among lobes is not part of these tests.
 #include <gtest/gtest.h>
 
 #include <utility>

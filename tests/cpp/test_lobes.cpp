@@ -18,8 +18,8 @@ using bsdf_testing::direction;
 using Vec = Vec3<float>;
 using Complex = std::complex<double>;
 
-/// Fresnel's equations with complex refraction: the textbook form, which the code under test does
-/// not use.
+/// Fresnel equations for a complex refractive index, in the textbook form. The code under test uses
+/// a different form.
 double fresnel_reference(double cos_i, Complex n) {
   const Complex sin_t = std::sqrt(1 - cos_i * cos_i) / n;
   const Complex cos_t = std::sqrt(1.0 - sin_t * sin_t);
@@ -42,8 +42,8 @@ TEST(Fresnel, DielectricMatchesReference) {
 TEST(Fresnel, KnownValues) {
   EXPECT_NEAR(fresnel_dielectric(1.f, 1.5f).reflectance, 0.04f, 1e-7f);
   EXPECT_NEAR(fresnel_dielectric(0.5f, 1.5f).reflectance, 0.0891867f, 1e-6f);  // 60 degrees
-  // At Brewster's angle, tan = n, only perpendicular polarisation is reflected: ((n^2 - 1) / (n^2 +
-  // 1))^2 / 2.
+  // At Brewster's angle, whose tangent is n, only perpendicular polarisation is reflected. The
+  // reflectance is ((n^2 - 1) / (n^2 + 1))^2 / 2.
   EXPECT_NEAR(fresnel_dielectric(1 / std::sqrt(1 + 2.25f), 1.5f).reflectance,
               0.5f * std::pow(1.25f / 3.25f, 2.f), 1e-6f);
   EXPECT_EQ(fresnel_dielectric(0.5f, 1 / 1.5f).reflectance, 1.f);
@@ -51,7 +51,7 @@ TEST(Fresnel, KnownValues) {
   EXPECT_EQ(fresnel_dielectric(0.f, 1.5f).reflectance, 1.f);
   EXPECT_EQ(fresnel_dielectric(0.f, 1.f).reflectance, 0.f);
   EXPECT_LT(fresnel_dielectric(0.3f, 1.f).reflectance, 1e-12f);
-  // Reflectances agree from both sides of an interface along the same path.
+  // The reflectance of an interface is the same for both directions of a light path.
   for (float c : {0.1f, 0.4f, 0.8f, 1.f}) {
     for (bool schlick : {false, true}) {
       const auto [r, t] = fresnel_dielectric(c, 1.5f, schlick);
@@ -85,7 +85,7 @@ TEST(Fresnel, F82TintHitsItsTwoColours) {
   EXPECT_NEAR(at_82.y, 0.7f * schlick.y, 1e-5f);
   EXPECT_NEAR(at_82.z, 0.2f * schlick.z, 1e-5f);
   EXPECT_NEAR(f(0.f).y, 1.f, 1e-6f);
-  // Computes the hemispherical mean with parameters for which nothing is clamped.
+  // Compute the hemispherical mean, with parameters for which the model clamps no values.
   double mean = 0;
   for (int i = 0; i < 10000; ++i) {
     const float c = (static_cast<float>(i) + 0.5f) / 10000.f;
@@ -147,8 +147,8 @@ TEST(Ggx, VisibleNormalsProjectToTheViewersArea) {
     }
 }
 
-/// Area to which a map from the tangent plane at `w` to the sphere scales a unit area, by central
-/// differences.
+/// Returns the factor by which a map from the tangent plane at `w` to the sphere scales areas, by
+/// central differences.
 template <typename Map>
 double numeric_jacobian(const Vec& w, Map map) {
   const float e = 4e-3f;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// core/math.h compared with double precision, in units in the last place, and packets with
-/// scalars.
+/// Tests of core/math.h: errors compared with double precision, in units in the last place, and
+/// equal results of packets and scalars.
 #include "wavecomb/core/math.h"
 
 #include <functional>
@@ -15,7 +15,8 @@ using namespace lane_testing;
 
 constexpr double kPiD = 3.14159265358979323846;
 
-/// Returns floats that cover [lo, hi] uniformly and by magnitude, including the ends.
+/// Returns floats in [lo, hi], including both ends: some uniformly distributed, and some at all
+/// orders of magnitude.
 std::vector<float> cover(float lo, float hi) {
   std::vector<float> x = {lo, hi};
   const size_t n = is_long() ? 400000 : 100000;

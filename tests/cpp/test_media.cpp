@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Medium events, and shadow rays with coloured transmittance: fog in both integrators.
+// Tests of fog in both integrators: medium events, and shadow rays with coloured transmittance.
 #include "media_testing.h"
 #include "wave_testing.h"
 #include "wavecomb/material/program_table.h"
@@ -72,8 +72,9 @@ RenderedImage foggy_reference(const FoggyScene& f, const Settings& s) {
   return run.image();
 }
 
-/// Fog records have no triangle, are sorted among surface records, and are shaded by a non-surface
-/// program. The image is bitwise the same for all schedules.
+/// Tests scattering events in fog. Their records have no triangle, are sorted together with surface
+/// records, and are shaded by a program for volumes. The image must be bitwise equal for all
+/// scheduling policies.
 TEST(Media, FogIsOnePicture) {
   for (const bool tracks_ratio : {false, true}) {
     FoggyScene f = foggy({0.3f, 0.5f, 0.9f}, true, true, 1.5f);
@@ -134,8 +135,8 @@ double single_scattering(double sigma, double albedo, double floor_albedo, bool 
   return l;
 }
 
-/// About 12 comparisons with 4.2 standard errors each: one run in 3,000 with other seeds fails by
-/// chance (Sidak).
+/// With about 12 comparisons of 4.2 standard errors each, one run in 3,000 would fail by chance
+/// with other seeds (Sidak).
 TEST(Media, SingleScatteringIsTheIntegral) {
   const float extinction[3] = {0.3f, 0.5f, 0.9f};
   const double albedo[3] = {0.9, 0.8, 0.7}, floor[3] = {0.6, 0.5, 0.4};

@@ -11,7 +11,7 @@ namespace wavecomb {
 
 class Scene;
 
-/// Index for a missing name or placement.
+/// Index value that means "no name" or "no placement".
 inline constexpr uint32_t kNoName = 0xffffffffu;
 
 /// Name of an instance of a group, and the length of the prefix that names its asset (0 if
@@ -43,7 +43,8 @@ class NameTable {
 
 /// One level of nesting between the world and an instance.
 struct Placement {
-  uint32_t parent = kNoName;  ///< enclosing placement; kNoName for the world
+  /// index of the enclosing placement; kNoName if the world is the parent
+  uint32_t parent = kNoName;
   uint32_t group = 0;         ///< the instanced group
   uint32_t name = kNoName;    ///< index into the name table of the scene
   uint32_t number = kNoName;  ///< number that distinguishes placements with the same name

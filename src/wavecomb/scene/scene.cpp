@@ -41,9 +41,9 @@ bool same_presence(const Material& a, const Material& b) {
          same_texture(a, b, Input::kOpacity);
 }
 
-/// Returns whether two materials give a surface the same emission. A surface with a material that
-/// does not emit may be part of a mesh light (`any_mesh_lights`), whose emission depends on
-/// presence.
+/// Returns whether two materials give a surface the same emission. If the scene has mesh lights
+/// (`any_mesh_lights`), materials without emission must also agree in presence, since a mesh light
+/// emits only where its mesh is present.
 bool same_emission(const Material& a, const Material& b, bool any_mesh_lights) {
   if (a.emits() != b.emits()) return false;
   if (!a.emits()) return !any_mesh_lights || same_presence(a, b);
@@ -130,8 +130,8 @@ bool Scene::needs_in_glass(const SceneGeometry& geometry, std::span<const Materi
   if (!volumes().empty()) return true;
   const auto test = [&](const Material& m) { return is_absorbing_solid(m, *materials_->graphs); };
   const Glasses before = glasses_of(materials(), test), after = glasses_of(all_materials, test);
-  // The scene's materials may end with an additional one for collisions inside meshes, which
-  // `after` lacks.
+  // The current materials of the scene may end with an internal material for collisions inside
+  // meshes; the new materials do not contain this material.
   const bool same_glass =
       &geometry == geometry_.get() && std::equal(after.begin(), after.end(), before.begin());
   const bool same_lights =

@@ -25,14 +25,16 @@ struct SceneView {
   const MeshRecord* meshes = nullptr;
   const InstanceRecord* instances = nullptr;
   const TangentRecord* tangents = nullptr;  ///< indexed by mesh; null if no mesh has tangents
-  const uint32_t* geometry_mesh = nullptr;  ///< mesh id, at (instance.geometry + geometry id)
-  /// Index of the first triangle light of a mesh instance, at (instance.emissive + geometry id).
+  /// mesh id of a geometry of an instance, at index `instance.geometry` + geometry id
+  const uint32_t* geometry_mesh = nullptr;
+  /// Light index of the first triangle of an emissive mesh instance, stored at index
+  /// `instance.emissive` + geometry id.
   const uint32_t* emissive_lights = nullptr;
-  /// Record of the mesh light of a mesh instance, or kNoLight, indexed like emissive_lights. Null
-  /// if there are no mesh lights.
+  /// Index of the light record of a mesh light, or kNoLight for other mesh instances. Indexed like
+  /// `emissive_lights`. Null if the scene has no mesh lights.
   const uint32_t* mesh_lights = nullptr;
-  /// RayVisibility of a mesh instance, indexed like emissive_lights. Null if all rays see
-  /// everything.
+  /// RayVisibility bits of each mesh instance, indexed like `emissive_lights`. Null if every object
+  /// is visible to all rays.
   const uint32_t* visibility = nullptr;
   const uint32_t* material_program = nullptr;
   const uint32_t* material_variant = nullptr;  ///< see variants.h
@@ -54,9 +56,10 @@ struct SceneView {
 struct SceneBytes {
   /// Points, indices, radii, normals, tangents, texture coordinates, attributes and face materials.
   uint64_t meshes = 0;
-  uint64_t textures = 0;  ///< all mip levels, or the tiles that a texture store holds
-  uint64_t records = 0;   ///< instances, materials, lights
-  uint64_t volumes = 0;   ///< grids
+  /// all mip levels, or only the resident tiles if textures are in a texture store
+  uint64_t textures = 0;
+  uint64_t records = 0;  ///< instances, materials, lights
+  uint64_t volumes = 0;  ///< grids
 };
 
 /// New values for parts of a scene.
@@ -64,10 +67,10 @@ struct SceneEdit {
   std::optional<Camera> camera{};
   std::map<uint32_t, Material> materials{};  ///< by id
   std::map<uint32_t, Light> lights{};        ///< new lights, by index into Scene::lights
-  /// Moves by prim path (ObjectNames): a transform in world space, applied to everything at or
-  /// below the prim after the transforms of the original scene. The identity undoes earlier moves
-  /// of the prim. Moves do not apply to lights in `lights`. Prims that are not listed keep their
-  /// last move.
+  /// World-space transforms that move prims, by prim path. A transform applies to all objects at or
+  /// below its prim, after the transforms of the original scene. The identity undoes earlier moves
+  /// of the prim. Lights that this edit replaces in `lights` are not moved. Prims that are not
+  /// listed keep their last move.
   std::map<std::string, Affine> moves{};
 };
 
@@ -86,8 +89,8 @@ class Scene : public std::enable_shared_from_this<Scene> {
   /// Returns the groups of meshes. Group 0 is the world, whose meshes are in world space and not
   /// instanced.
   const std::vector<Group>& groups() const { return geometry_->groups; }
-  /// Returns the flattened instances: each entry is an instance of a group of meshes (never group
-  /// 0) in world space.
+  /// Returns all instances of groups in world space, with nesting resolved. No entry is an instance
+  /// of group 0.
   const std::vector<Instance>& instances() const { return geometry_->instances; }
   const std::vector<Material>& materials() const { return materials_->materials; }
   const std::vector<TexturePtr>& textures() const { return geometry_->textures; }
@@ -98,7 +101,8 @@ class Scene : public std::enable_shared_from_this<Scene> {
   const std::vector<Volume>& volumes() const { return geometry_->volumes; }
   /// Returns the names of light groups; the first is kOtherLights.
   const std::vector<std::string>& light_groups() const { return geometry_->light_groups; }
-  /// Returns, for every light of the light set, its index into light_groups(); triangles come last.
+  /// Returns the index into light_groups() of every light of the light set; triangle lights come
+  /// last.
   std::vector<uint32_t> groups_of_lights() const;
   /// Returns, for every light of the light set, 1 if the light is the emission of an object's
   /// material and 0 if it is a light of the stage.
@@ -122,20 +126,21 @@ class Scene : public std::enable_shared_from_this<Scene> {
   uint64_t points() const;
   uint64_t splats() const;
   SceneBytes bytes() const;
-  /// Returns one line for each defect that was fixed or left out while building, such as faces
-  /// without area or NaN points.
+  /// Returns warnings about invalid scene data that was repaired or skipped while building, such as
+  /// NaN points; one line per warning.
   const std::vector<std::string>& warnings() const { return geometry_->warnings; }
 
-  /// Returns a scene with the values of an edit, which shares all unchanged data with this scene.
-  /// The result equals a scene built from scratch with the new values, except that meshes of the
-  /// world are instances once an object was moved. `threads`: 0 uses all.
+  /// Returns a new scene with the values of `edit`. The new scene shares all unchanged data with
+  /// this scene. The new scene renders like a scene built from scratch with the new values. After
+  /// the first move of an object, the meshes of the world are stored as an instance. `threads` is
+  /// the number of threads; 0 means all.
   ///
   /// A camera edit takes microseconds. A material edit copies the materials. An edit of lights or
-  /// of emission rebuilds the light set. If a new material needs tangents, they are computed. A
-  /// material that begins or ceases to absorb, or a light that moves, costs a search of the
-  /// contents of absorbing glass, as does a move. A move also copies the instances, and rebuilds
-  /// the light set if the scene has lights below the prim or emissive meshes. Throws Error naming
-  /// the object for invalid values, as SceneBuilder does, and for unknown ids.
+  /// of emission rebuilds the light set. If a new material needs tangents, the edit computes them.
+  /// Edits that change which materials absorb, or that move a light or an object, search absorbing
+  /// glass for objects and lights inside it. A move of an object also copies the instances, and
+  /// rebuilds the light set if the scene has emissive meshes or lights below the prim. Throws Error
+  /// with the name of the object if a value is invalid or an id is unknown.
   std::shared_ptr<const Scene> edited(const SceneEdit& edit, uint32_t threads = 0) const;
 
   /// Return the parts of the scene, so that callers can tell which parts an edited scene shares
@@ -152,7 +157,8 @@ class Scene : public std::enable_shared_from_this<Scene> {
         const Camera& camera);
   /// Computes for each object the link sets that it belongs to and the kinds of rays that see it.
   void link();
-  /// Returns SceneMaterials::in_glass for this scene with the given geometry, materials and lights.
+  /// Returns the value of `SceneMaterials::in_glass` for an edit of this scene that has the given
+  /// geometry, materials and lights.
   bool needs_in_glass(const SceneGeometry& geometry, std::span<const Material> materials,
                       std::span<const Light> lights) const;
   /// Throws Error for values of an edit that are invalid.
@@ -170,7 +176,7 @@ class Scene : public std::enable_shared_from_this<Scene> {
   std::shared_ptr<const SceneLights> lights_;
   std::shared_ptr<const SceneTangents> tangents_;
   std::shared_ptr<const SceneLinks> links_;  ///< null if the scene has no link sets
-  /// SceneView::visibility; null if all rays see everything.
+  /// Data of SceneView::visibility; null if every object is visible to all rays.
   std::shared_ptr<const std::vector<uint32_t>> visibility_;
   Camera camera_;
   SceneView view_;
@@ -180,27 +186,28 @@ class Scene : public std::enable_shared_from_this<Scene> {
 
 /// Collects the contents of a scene. Ids count from 0 in order of addition.
 ///
-/// Contract: used by one thread at a time. The caller keeps ownership of mesh arrays, which must
-/// live as long as the Scene (see Mesh::owner). Every function throws Error with one line that
-/// names the object.
+/// Contract: only one thread at a time may use a builder. The caller keeps ownership of mesh
+/// arrays, which must live as long as the Scene (see Mesh::owner). If an argument is invalid,
+/// functions throw Error with one line that names the object.
 class SceneBuilder {
  public:
-  /// Makes an empty builder. `threads` are used for textures and for build() (0: all). `store`
-  /// holds the textures that are added, and may hold textures of other scenes; if it is null,
-  /// textures stay in memory.
+  /// Makes an empty builder. `threads` is the number of threads that build textures and the scene;
+  /// 0 means all. `store` is the texture store for added textures, and several scenes may share it.
+  /// If `store` is null, textures stay in memory.
   explicit SceneBuilder(uint32_t threads = 0, std::shared_ptr<TileStore> store = nullptr);
   SceneBuilder(SceneBuilder&&) = default;
   SceneBuilder& operator=(SceneBuilder&&) = default;
 
   uint32_t add_texture(const TextureDesc& desc);
-  /// Adds a texture of another scene, which may be destroyed before this one.
+  /// Adds a texture of another scene. The other scene may be destroyed before this scene.
   uint32_t add_texture(TexturePtr texture);
   /// Makes a UDIM texture from textures already added, by tile number from 1001 to 1100. `missing`
   /// is the linear r, g, b, alpha of missing tiles.
   uint32_t add_tiles(const std::string& name,
                      const std::vector<std::pair<uint32_t, uint32_t>>& tiles,
                      const std::array<float, 4>& missing);
-  /// Returns a texture that was added; valid until the builder is destroyed or build() is called.
+  /// Returns the texture with the given id. The reference is valid until the builder is destroyed
+  /// or build() is called.
   const Texture& texture(uint32_t id) const;
   /// Adds a value graph for Material::graph, opacity_graph or emission_graph. Outputs are numbered
   /// as in graph/parameters/parameters.h. The texture ids in the graph must exist.
@@ -231,23 +238,23 @@ class SceneBuilder {
   /// Adds a name for instances. The first `asset_length` characters of the name are the name of the
   /// asset; 0 means that the asset is unknown.
   uint32_t add_placement_name(std::string_view name, uint32_t asset_length);
-  /// Adds a set for Light::light_link and shadow_link.
+  /// Adds a geometry set and returns its id, for Light::light_link and Light::shadow_link.
   uint32_t add_geometry_set(GeometrySet set);
-  /// Sets which rays see a prim and its descendants. Of two rules for the same path, the later
-  /// wins.
+  /// Sets which rays see a prim and its descendants. A later rule for the same path overrides an
+  /// earlier rule.
   void add_visibility(VisibilityRule rule);
-  /// Adds a profile for Shaping::ies.
+  /// Adds an IES profile and returns its id, for Shaping::ies.
   uint32_t add_ies(IesProfile profile);
-  /// Adds a filter for Light::filter.
+  /// Adds a light filter and returns its id, for Light::filter.
   uint32_t add_light_filter(LightFilter filter);
   uint32_t add_light(Light light);
-  /// Adds a light for Mesh::mesh_light, of kind kMeshLight. If the light is not `visible`, the
-  /// opacity of the mesh does not affect its emission.
+  /// Adds a light of kind kMeshLight and returns its id, for Mesh::mesh_light. If the light is not
+  /// `visible`, the opacity of the mesh does not affect its emission.
   uint32_t add_mesh_light(Light light);
-  /// Returns the number of the light group called `name`, for Light::group and Mesh::light_group;
-  /// "" is kOtherLights.
+  /// Returns the index of the light group called `name`, for Light::group and Mesh::light_group. An
+  /// empty name means the group kOtherLights.
   uint32_t light_group(const std::string& name);
-  /// Adds a volume in world space, independent of surfaces. Volumes may overlap.
+  /// Adds a volume in world space. No surface bounds the volume. Volumes may overlap.
   uint32_t add_volume(Volume volume);
   void set_camera(const Camera& camera);
 
@@ -264,20 +271,21 @@ class SceneBuilder {
     uint32_t name, number;
     StepRange motion;  ///< range of the node's transforms in node_steps_
   };
-  /// Counts the instances of groups with meshes in one placement of `group`; throws Error for
-  /// cycles.
+  /// Returns the number of instances that one placement of `group` adds, counting only groups with
+  /// meshes. Throws Error if groups contain each other in a cycle.
   uint64_t count_placements(uint32_t group, uint32_t depth, std::vector<uint64_t>& of_group) const;
-  /// Appends the instances of `group` and of everything nested in it. `steps` are the transforms of
-  /// `here` over the shutter interval, if it moves.
+  /// Appends the instance `here` of `group` and the instances nested in `group` to `out`. `steps`
+  /// are the transforms of `here` over the shutter interval; empty if `here` does not move.
   void flatten(uint32_t group, const Instance& here, std::span<const Affine> steps,
                const std::vector<uint64_t>& counts, std::vector<Instance>& out,
                SceneGeometry& geometry) const;
-  /// Returns the transforms of a node over the shutter interval, within a group with the transforms
-  /// `outer` if it moves, or the transform `still`. Returns an empty list if neither the group nor
-  /// the node moves.
+  /// Returns the transforms to world space of a node over the shutter interval. `outer` are the
+  /// transforms of the enclosing group if the group moves, and `still` is its transform otherwise.
+  /// Returns an empty list if neither the group nor the node moves.
   std::vector<Affine> composed(std::span<const Affine> outer, const Affine& still,
                                const Node& node) const;
-  /// Flattens all groups to instances, without those of singular transforms, and checks counts.
+  /// Flattens all groups to a list of instances, leaves out instances with singular transforms, and
+  /// checks counts against the limits.
   void flatten_groups(SceneGeometry& geometry);
   /// Adds the internal materials: for meshes without a material, for collisions in volumes and
   /// media, and for exit points of random walks. Returns the index of the first added material,
@@ -286,13 +294,13 @@ class SceneBuilder {
   /// Returns SceneMaterials::in_glass, and warns of glass whose absorption comes from a value
   /// graph.
   bool search_glass(const SceneGeometry& geometry);
-  /// Warns of glass whose absorption comes from a value graph, if that is visible: with `in_glass`
-  /// (SceneMaterials), or with objects or lights inside it.
+  /// Warns of glass whose absorption comes from a value graph, if `in_glass` is true or there are
+  /// objects or lights inside the glass. Without these, the missing absorption is not visible.
   void warn_of_absorbing_graphs(const PlacedObjects& objects, bool in_glass);
   /// Binds the grey material to instances without a material. Throws Error for materials that were
   /// never added.
   void bind_materials(SceneGeometry& geometry, uint32_t grey) const;
-  /// Moves everything but materials, graphs and lights to `geometry`.
+  /// Moves all data except materials, graphs and lights from the builder to `geometry`.
   void move_parts(SceneGeometry& geometry);
   void make_records(SceneGeometry& geometry, uint32_t grey) const;
 

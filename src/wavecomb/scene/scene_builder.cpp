@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// SceneBuilder: functions that add to a scene.
+/// Functions of SceneBuilder that add objects to a scene.
 #include <algorithm>
 #include <limits>
 #include <utility>

@@ -16,8 +16,8 @@ std::string quoted(const std::string& kind, const std::string& name) {
 
 namespace {
 
-/// Throws Error if a program-specific number is out of range; check_material reports numbers that
-/// are not finite.
+/// Throws Error if a program-specific parameter is out of range. Infinite and NaN values are
+/// checked in `check_material`.
 void check_specific(const std::string& of, const ProgramParameter& p, float value) {
   if (value < p.least || value > p.most)
     throw Error(of + ": " + p.name + " is " + text(double{value}) + "; it must be from " +

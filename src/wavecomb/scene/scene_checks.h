@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Checks of scene values, for SceneBuilder and for edits. All checks throw Error with one line
-/// that names the object. For lights see light/description/light_table.h.
+/// that names the object. Checks of lights are in light/description/light_table.h.
 #pragma once
 
 #include <cmath>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// SceneBuilder: flattens nested groups to a list of instances and assembles the scene.
+/// Functions of SceneBuilder that flatten nested groups to a list of instances and assemble the
+/// scene.
 #include <unistd.h>
 
 #include <algorithm>
@@ -19,10 +20,11 @@ namespace wavecomb {
 namespace {
 
 constexpr uint64_t kUncounted = ~uint64_t{0};
-/// Minimum memory of an instance, most of it for Embree's geometry.
+/// Minimum memory of an instance in bytes. Embree's geometry takes most of this memory.
 constexpr uint64_t kInstanceBytes = 400;
 
-/// Returns the maximum number of instances, by 32-bit indices and by the memory of this machine.
+/// Returns the maximum number of instances that 32-bit indices and the memory of this machine
+/// permit.
 uint64_t max_instances() {
   const long pages = sysconf(_SC_PHYS_PAGES), page_bytes = sysconf(_SC_PAGE_SIZE);
   if (pages <= 0 || page_bytes <= 0) return kMaxInstances;
@@ -124,8 +126,8 @@ void SceneBuilder::warn_of_absorbing_graphs(const PlacedObjects& objects, bool i
 }
 
 void SceneBuilder::flatten_groups(SceneGeometry& geometry) {
-  // Count instances first, because n nested groups can have 2^n placements, most of which may
-  // contain nothing.
+  // Count instances before flattening: n nested groups can have 2^n placements, and most of them
+  // may be empty.
   std::vector<uint64_t> placements(groups_.size(), kUncounted);
   std::vector<Instance> flat;
   flat.reserve(count_placements(0, 0, placements));

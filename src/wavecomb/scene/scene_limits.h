@@ -15,21 +15,21 @@ inline constexpr uint64_t kMaxRowWords = uint64_t{1} << 32;
 /// Maximum number of instances, of 16 32-bit words each; the first is the world.
 inline constexpr uint64_t kMaxInstances = kGatherWords / 16 - 1;
 
-/// Numbers of all objects that kernels index.
+/// Number of objects of each kind that kernels access by index.
 struct SceneCounts {
   uint64_t meshes = 0, materials = 0, instances = 0;
-  uint64_t grouped = 0;           ///< sum over all groups of their meshes
-  uint64_t instanced_meshes = 0;  ///< sum over all instances, including the world, of their meshes
+  uint64_t grouped = 0;           ///< number of meshes in all groups
+  uint64_t instanced_meshes = 0;  ///< number of meshes in all instances, including the world
   uint64_t placements = 0;        ///< nested instances, including those that contain only groups
   uint64_t steps = 0;             ///< number of transforms of all moving instances
   uint64_t lights = 0;  ///< number of lights, including instances of mesh lights and portals
   uint64_t profile_values = 0;  ///< number of angles and candela values of all IES profiles
-  /// geometry sets for light linking (one bit each) times link classes, in 32-bit words
+  /// size in 32-bit words of the table for light linking: one bit per geometry set and link class
   uint64_t link_words = 0;
 };
 
-/// Throws Error for the first count that exceeds its limit. The message says in one line which
-/// limit was exceeded, how many objects there are, and what to do.
+/// Throws Error if a count exceeds its limit. The message says in one line which limit was
+/// exceeded, how many objects there are, and what to do.
 void check_counts(const SceneCounts& counts);
 
 /// Formats 16777216 as "16,777,216".

@@ -27,7 +27,7 @@
 
 namespace wavecomb {
 
-/// Packed instance, one cache line. Instance 0 is the world itself (identity).
+/// Packed instance; a record fills one cache line. Instance 0 is the world itself (identity).
 struct alignas(64) InstanceRecord {
   float to_world[12];  ///< 3 x 4 matrix [A | translation], row by row
   /// Index of the first entry of the instance's group in SceneView::geometry_mesh.
@@ -35,7 +35,7 @@ struct alignas(64) InstanceRecord {
   uint32_t material;  ///< material of the group's meshes whose material is kInheritMaterial
   /// Index of the instance's first entry in SceneView::emissive_lights, if any mesh emits.
   uint32_t emissive;
-  float side;  ///< sign of det A: -1 for a transform that mirrors
+  float side;  ///< sign of det A; -1 for a mirroring transform
 };
 static_assert(sizeof(InstanceRecord) == 64);
 
@@ -65,8 +65,8 @@ struct Instance {
   uint32_t group = 0;
   Affine to_world;
   uint32_t material = kInheritMaterial;
-  /// Index into Scene::placements; kNoName for meshes of the world that an edit has made an
-  /// instance.
+  /// Index into Scene::placements. The value is kNoName for the instance that contains the meshes
+  /// of the world after an edit has moved an object.
   uint32_t placement = kNoName;
   StepRange motion;  ///< range of SceneGeometry::steps
 };
@@ -76,8 +76,9 @@ inline constexpr uint32_t kMaxLightGroups = 64;
 /// Name of group 0, for lights without a group.
 inline constexpr const char* kOtherLights = "other";
 
-/// Everything that edits of materials, lights and the camera cannot change: shapes and transforms,
-/// textures, names. A scene with moved objects has a copy with other instances (scene/moves.h).
+/// Scene data that edits of materials, lights and the camera do not change: shapes, transforms,
+/// textures and names. A scene with moved objects has a copy of this data with different instances
+/// (scene/moves.h).
 struct SceneGeometry {
   std::vector<Mesh> meshes;
   /// Distinct face materials of each mesh; empty for meshes without face materials.
@@ -139,29 +140,30 @@ struct SceneGeometry {
   }
 };
 
-/// Fills `geometry_mesh`, the instance records, `bounds` and `radius` for the groups and instances
-/// of `geometry`, whose record 0, of the world, keeps its material.
+/// Computes `geometry_mesh`, `instance_records`, `bounds` and `radius` from the groups and
+/// instances of `geometry`. Record 0, the world, keeps its material.
 void place_instances(SceneGeometry& geometry);
 
 /// Materials and their packed form.
 struct SceneMaterials {
   /// Packs materials. `textures` are the scene's textures, which materials and graphs read, and
-  /// `exit_material` is SceneGeometry::exit_material. Appends the material of collisions inside
-  /// meshes to `materials` if a material needs a medium stack, which depends on `in_glass` (see the
-  /// member).
+  /// `exit_material` is SceneGeometry::exit_material. If a material needs a medium stack, appends
+  /// an internal material for collisions inside meshes to `materials`. Whether absorbing glass
+  /// needs a medium stack depends on `in_glass`.
   SceneMaterials(std::vector<Material> materials, std::shared_ptr<const GraphSet> graphs,
                  std::span<const TexturePtr> textures, uint32_t exit_material, bool in_glass);
   /// Number of materials without the one for collisions inside meshes.
   std::vector<Material> given() const;
 
-  std::vector<Material> materials;  ///< materials as the caller described them
-  std::vector<Material> shaded;     ///< materials after simplified() (simplified_material.h)
+  /// materials as passed to the constructor, before simplification
+  std::vector<Material> materials;
+  std::vector<Material> shaded;  ///< materials after simplified() (simplified_material.h)
   std::shared_ptr<const GraphSet> graphs;
   std::vector<MaterialRecord> records;
   std::vector<TextureUseRecord> uses;
   std::vector<uint32_t> programs;  ///< by material
   std::vector<uint32_t> variants;  ///< least expensive variant of the program of each material
-  /// Flag of each material: whether smooth tangents affect its shading (tangents.h).
+  /// 1 for each material whose shading depends on smooth tangents, else 0 (tangents.h).
   std::vector<uint8_t> wants_tangents;
   std::vector<OpenPbrRecord> openpbr;  ///< records of materials of the program openpbr
   /// Program-specific parameters by material; empty if no material's program has any.
@@ -183,26 +185,28 @@ struct SceneMaterials {
 /// Lights of the stage and emissive triangles.
 struct SceneLights {
   /// Packs the lights, and makes lights of the triangles of all meshes whose materials emit.
-  /// Reuses unchanged data of `before`, the lights of a scene with the same geometry; `before` may
-  /// be null.
+  /// `before` may be the lights of a scene with the same geometry, whose unchanged data is then
+  /// reused, or null.
   SceneLights(std::vector<Light> lights, const SceneGeometry& geometry,
               const SceneMaterials& materials, const SceneLights* before);
 
-  /// Returns the light tree. The first call builds the tree if `set` has only its outline.
-  /// Thread-safe.
+  /// Returns the complete light tree. If `set` contains only an outline of the tree, the first call
+  /// builds the tree. Thread-safe.
   const LightTree& tree(uint32_t threads) const;
   /// Returns the size in bytes of the nodes and trails of the tree.
   uint64_t tree_bytes() const;
 
   std::vector<Light> lights;
   LightSet set;
-  std::vector<uint32_t> emissive;     ///< SceneView::emissive_lights; empty if nothing emits
-  std::vector<uint32_t> mesh_lights;  ///< SceneView::mesh_lights; empty if there are none
+  std::vector<uint32_t> emissive;  ///< SceneView::emissive_lights; empty if nothing emits
+  /// SceneView::mesh_lights; empty if the scene has no mesh lights
+  std::vector<uint32_t> mesh_lights;
   /// Light group of a range of triangle lights, which begins at `first` and ends at the `first` of
   /// the next entry.
   struct TriangleGroup {
     uint32_t first, group;
-    bool is_light;  ///< whether the triangles belong to a mesh light, not to an emissive material
+    /// true for the triangles of a mesh light, false for those of an emissive material
+    bool is_light;
   };
   std::vector<TriangleGroup> triangle_groups;
 

@@ -21,8 +21,8 @@ std::string_view above(std::string_view path) {
 }
 
 /// Returns the visibility of an object with the path `object_path`, which is an instance of the
-/// mesh `group_path` in a group whose root path is `root`. For each bit, the rule of the nearest
-/// prim among the object and its ancestors wins.
+/// mesh `group_path` in a group whose root path is `root`. Each visibility bit comes from the rule
+/// of the nearest prim, among the object and its ancestors, that sets the bit.
 uint32_t visibility_of(const Rules& rules, std::string_view object_path,
                        std::string_view group_path, std::string_view root) {
   uint32_t specified = 0, bits = 0;

@@ -21,20 +21,21 @@ enum RayVisibility : uint32_t {
   kHoldout = 8,
 };
 
-/// Visibility of a prim and of its descendants without a rule. For prims inside a group, the path
-/// is that of the group's first placement, and the rule applies to all of its placements.
+/// Visibility rule for a prim and for those of its descendants that have no rule. For prims inside
+/// a group, the path is that of the group's first placement, and the rule applies to all of its
+/// placements.
 struct VisibilityRule {
   std::string path;
   uint32_t specified = 0;  ///< mask of the RayVisibility bits that the rule sets
   uint32_t bits = 0;       ///< values of the bits in the mask
 };
 
-/// Returns the RayVisibility of all objects, for the meshes of each instance in order as in
-/// InstanceRecord::emissive; empty if all rays see everything.
+/// Returns the RayVisibility bits of all mesh instances, indexed like SceneView::emissive_lights.
+/// The result is empty if every object is visible to all rays.
 std::vector<uint32_t> object_visibility(const Scene& scene, const ObjectNames& names);
 
-/// Returns the RayVisibility of the ray that a path traces after `depth` vertices, or of the shadow
-/// ray from its last vertex.
+/// Returns the RayVisibility bit of the ray that a path traces after `depth` vertices. With
+/// `shadow`, returns the bit of shadow rays.
 constexpr uint32_t ray_kind(uint32_t depth, bool shadow) {
   if (shadow) return kVisibleToShadowRays;
   return depth == 0 ? kVisibleToCamera : kVisibleToBounces;

@@ -8,7 +8,7 @@ namespace wavecomb {
 
 size_t Chooser::choose(uint32_t depth, std::span<const Work> work) {
   const uint32_t calls = ++calls_[row(depth)];
-  // Try each arm a few times first, so that short renders do not spend their time on one arm.
+  // Measure every arm a few times first, so that even a short render can compare them.
   size_t newest = 0;
   for (size_t arm = 1; arm < arms_; ++arm)
     if (stat(depth, arm).tries < stat(depth, newest).tries) newest = arm;

@@ -9,7 +9,8 @@
 
 namespace wavecomb {
 
-/// Expected work of an arm for one queue: packets to run and records to prepare.
+/// Expected work of one arm for one shading queue: number of packets to shade and of records to
+/// sort or move.
 struct Work {
   double packets = 0;
   double records = 0;
@@ -18,15 +19,17 @@ struct Work {
 /// Chooser among several ways ("arms") to process a queue. The chooser predicts the time of each
 /// arm as
 ///   packets * (ns per packet) + records * (ns per record to prepare)
-/// and chooses the smallest. Both costs are exponential averages per depth and arm. Untried arms
-/// come first. Later the chooser occasionally retries an arm whose predicted time is nearly the
-/// best, since costs vary over the image, and rarely any other arm. Measurements are clamped to
-/// twice the average, since other work on the machine may slow some of them down.
+/// and chooses the arm with the smallest time. Both costs are exponential moving averages per path
+/// depth and arm. Arms without measurements are chosen first. Later the chooser occasionally
+/// retries an arm whose predicted time is nearly the best, since costs vary over the image, and
+/// rarely any other arm. Measurements are clamped to twice the average, since other programs on the
+/// machine may slow down a measurement.
 ///
-/// Contract: owned by one worker. The choice affects time only, never the image.
+/// Contract: owned by one worker. The choice affects render time but never the image.
 class Chooser {
  public:
-  static constexpr uint32_t kDepths = 16;  ///< deeper queues share the last entry
+  /// queues at greater path depths share the statistics of the last depth
+  static constexpr uint32_t kDepths = 16;
 
   explicit Chooser(size_t arms = 0) : arms_(arms), stats_(arms * kDepths) {}
 
@@ -35,7 +38,7 @@ class Chooser {
   /// Records the measured times of an arm: `run_ns` to run its packets, `prepare_ns` to prepare its
   /// records, both in nanoseconds.
   void learn(uint32_t depth, size_t arm, const Work& work, double run_ns, double prepare_ns);
-  /// Number of uses of each arm.
+  /// Returns how often each arm was chosen.
   std::span<const uint64_t> used() const { return used_; }
 
  private:

@@ -10,7 +10,7 @@
 
 namespace wavecomb {
 
-/// Coherence counts of one worker; ratios are computed after merging.
+/// Coherence counts of one worker. Ratios are computed after the counts of all workers are added.
 struct CoherenceCounts {
   uint64_t records = 0;        ///< records in the measured queues
   uint64_t runs = 0;           ///< maximal runs of consecutive records of one material
@@ -28,7 +28,7 @@ struct CoherenceCounts {
     texture_pairs += o.texture_pairs;
     same_texels += o.same_texels;
   }
-  /// Mean number of consecutive records of one material.
+  /// Returns the mean number of consecutive records with the same material.
   double run_length() const {
     return runs ? static_cast<double>(records) / static_cast<double>(runs) : 0;
   }

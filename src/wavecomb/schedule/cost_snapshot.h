@@ -11,7 +11,8 @@ namespace wavecomb {
 struct CostSnapshot {
   std::vector<float> material_ns;  ///< by material
   std::vector<float> texture_ns;   ///< by texture: mean cost of the records that read the texture
-  float mean_ns = 1;  ///< mean cost over measured records; before any measurement, over materials
+  /// mean cost of the measured records; before the first measurement, mean over materials
+  float mean_ns = 1;
 
   float material(uint32_t id) const { return material_ns[id]; }
   /// Returns the cost of a texture, or 0 for no texture.

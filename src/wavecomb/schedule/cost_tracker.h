@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Shading cost per material and texture, measured by workers and merged between passes.
+/// Measurement of the shading cost per material and texture. Workers measure during a pass, and the
+/// measurements are merged between passes.
 #pragma once
 
 #include <cstdint>
@@ -22,12 +23,14 @@ class CostTracker {
         record_counts_(materials),
         counts_before_(materials) {}
 
-  /// Adds a timed batch: `ns` nanoseconds for one record of each entry of `materials`.
+  /// Adds a batch of timed shading records. `materials` has the material of each record, and `ns`
+  /// is the mean time per record in nanoseconds.
   void charge(std::span<const uint32_t> materials, double ns);
-  /// Adds time spent on records of a material outside their timed batches, such as subsurface
-  /// random walks. `ns` covers all counted records, timed or not.
+  /// Adds `ns` nanoseconds that were spent on a material outside batches, for example on subsurface
+  /// random walks. This time is measured for all records of the material, not only for timed
+  /// batches.
   void charge_untimed(uint32_t material, double ns) { untimed_ns_[material] += ns; }
-  /// Counts records, timed or not.
+  /// Counts shading records by material, including records of batches that are not timed.
   void count(std::span<const uint32_t> materials) {
     for (uint32_t m : materials) ++record_counts_[m];
   }
@@ -37,15 +40,15 @@ class CostTracker {
     return records >= 32 ? (++large_ & 7u) == 0 : (++small_ & 31u) == 0;
   }
 
-  /// Total nanoseconds of timed records, by material.
+  /// Returns the total time of the timed records in nanoseconds, by material.
   std::span<const double> ns() const { return ns_; }
-  /// Number of timed records, by material.
+  /// Returns the number of timed records, by material.
   std::span<const uint64_t> timed() const { return timed_; }
-  /// Number of records, timed or not, by material.
+  /// Returns the number of all records, including those of batches that are not timed, by material.
   std::span<const uint64_t> record_counts() const { return record_counts_; }
-  /// Adds the measurements of `other` and clears them, except for `record_counts`. The time charged
-  /// outside timed batches is averaged over all records of a material and added to its timed
-  /// records.
+  /// Moves the measurements of `other` to this tracker; `other` keeps only its `record_counts`.
+  /// Time that was added by charge_untimed() is averaged over all records of a material, and the
+  /// average is added for each timed record.
   void take(CostTracker& other);
 
  private:
@@ -54,8 +57,9 @@ class CostTracker {
   uint32_t large_ = 0, small_ = 0;
 };
 
-/// Accuracy of the cost estimates that a pass was scheduled with, compared with its measurements.
-/// Covers the measured materials that had an estimate, weighted by timed records w.
+/// Accuracy of the material costs that were predicted for a pass, compared with the costs measured
+/// in the pass. Only materials with both values count. The weight w of a material is its number of
+/// timed records.
 struct CostPrediction {
   double r2 = 0;           ///< 1 - sum w (measured - predicted)^2 / sum w (measured - mean)^2
   double mean_error = 0;   ///< sum w |measured - predicted| / sum w measured

@@ -15,7 +15,7 @@ namespace wavecomb {
 
 /// Properties of a material that scheduling may use.
 struct MaterialTraits {
-  static constexpr uint32_t kNone = 0xffffffffu;  ///< id of no texture or no graph
+  static constexpr uint32_t kNone = 0xffffffffu;  ///< id that means "no texture" or "no graph"
   uint32_t program = 0;                           ///< shading program
   uint32_t texture = kNone;                       ///< largest texture
   uint64_t texture_bytes = 0;  ///< memory of the largest texture in bytes; 0 without textures
@@ -36,9 +36,10 @@ struct ShadingQueueView {
   std::span<const uint32_t> material;
   std::span<const float> throughput;       ///< luminance of the path's throughput
   std::span<const uint32_t> position_key;  ///< Morton code of the hit, 30 bits
-  std::span<const uint32_t> texture_key;   ///< UDIM tile (7 bits), mip level (4), Morton of uv (14)
+  /// UDIM tile (7 bits), mip level (4 bits) and Morton code of uv (14 bits)
+  std::span<const uint32_t> texture_key;
   std::span<const MaterialTraits> materials;  ///< by material id
-  std::span<float> scratch;                   ///< one float per material for the policy's use
+  std::span<float> scratch;  ///< buffer for the policy, with one float per material
   uint32_t depth = 0;
 
   size_t size() const { return material.size(); }
@@ -50,17 +51,17 @@ class SchedulingPolicy {
  public:
   virtual ~SchedulingPolicy() = default;
   virtual std::string_view name() const = 0;
-  /// Returns whether order() always keeps arrival order.
+  /// Returns whether this policy always keeps arrival order.
   virtual bool keeps_arrival_order() const { return false; }
   /// Returns the QueueColumn bits that order() reads.
   virtual uint32_t columns() const { return 0; }
-  /// Writes one 64-bit key per record. Records are shaded in ascending key order, ties in arrival
-  /// order. Returns false to keep arrival order without sorting.
+  /// Computes one 64-bit sort key per record. Records are shaded in ascending key order; records
+  /// with equal keys keep their arrival order. Returns false to keep arrival order without sorting.
   virtual bool order(const ShadingQueueView& queue, const CostSnapshot& costs,
                      std::span<uint64_t> keys) const = 0;
 };
 
-/// Creates a policy by name. Throws Error that lists the known names.
+/// Creates a policy by name. If the name is unknown, throws Error that lists the known names.
 std::unique_ptr<SchedulingPolicy> make_policy(std::string_view name);
 /// Name and description of a policy, for help texts and menus.
 struct PolicyInfo {

@@ -21,8 +21,9 @@ class RadixSorter {
   /// Buffer for the keys to sort.
   uint64_t* keys() { return key_.data(); }
 
-  /// Writes the indices 0 .. n-1 to `order` by ascending key, ties by ascending index. Returns
-  /// false, and leaves `order` unwritten, if the keys are already sorted.
+  /// Writes the indices 0 .. n-1 to `order`, sorted by ascending key. Indices with equal keys are
+  /// in ascending order. Returns false, and leaves `order` unwritten, if the keys are already
+  /// sorted.
   bool sort(size_t n, uint32_t* order);
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Rays of a wave that are traced next, shadow rays, and the results of traversal.
+/// Queues of path rays and shadow rays of a wave, and the hits found by traversal.
 #pragma once
 
 #include "wavecomb/core/rows/soa.h"
@@ -7,8 +7,8 @@
 namespace wavecomb {
 
 /// Rays in SoA layout and traversal order. All other path state stays in the path's slot of the
-/// pool. The order depends on the rays alone (slot order as generated; survivors keep their
-/// positions), so it is the same under every shading policy.
+/// pool. The order of the rays does not depend on the scheduling policy: rays are generated in slot
+/// order, and the rays of continuing paths keep their order.
 ///
 /// Contract: owned by one wave; the first `size` entries of each array are valid; arrays are padded
 /// by one packet past the end.
@@ -53,7 +53,8 @@ class HitBuffer {
   float* t;        ///< hit distance
   float *u, *v;    ///< barycentric coordinates: p = (1 - u - v) p0 + u p1 + v p2
   uint32_t* prim;  ///< primitive index within its geometry, such as a triangle of a mesh
-  uint32_t* geom;  ///< geometry index within the instance's group, or light index
+  /// geometry index within the instance's group, or light index if the ray hit the shape of a light
+  uint32_t* geom;
   uint32_t* inst;  ///< instance index, or a marker of EmbreeAccelerator for a miss or a light
   size_t bytes() const { return block_.bytes(); }
 
@@ -61,7 +62,7 @@ class HitBuffer {
   SoaBlock block_;
 };
 
-/// Shadow rays of one depth, at most one per path, in the order of the paths' rays.
+/// Shadow rays of one path depth, at most one per path, in the order of the ray queue.
 class ShadowQueue {
  public:
   ShadowQueue() = default;
@@ -75,7 +76,7 @@ class ShadowQueue {
   float* tfar;
   float *r, *g, *b;  ///< radiance added to the path if the ray is unoccluded
   uint32_t *slot, *ordered_slot, *direction;  ///< as in RayQueue
-  uint32_t* occluded;                         ///< result of traversal: 1 if occluded
+  uint32_t* occluded;                         ///< 1 if traversal found the ray occluded, else 0
   size_t size = 0;
   static constexpr size_t kColumns = 14;
   size_t bytes() const { return block_.bytes(); }

@@ -11,13 +11,13 @@
 
 namespace wavecomb {
 
-/// Hits in arrival order, which is ray order, plus a shading order. Ids are stored in columns,
-/// which policies read; the rest of each record is a contiguous row, which shading loads at once
-/// (docs/decisions/path-rows.md). `sorted_indices` is the shading order; `materialize()` moves the
-/// records into that order.
+/// Queue of hits, stored in arrival order (the order of their rays), with a separate shading order.
+/// The ids of a hit are stored in columns, which scheduling policies read. All other data of a hit
+/// is a contiguous row, which shading loads at once (docs/decisions/path-rows.md). `sorted_indices`
+/// is the shading order; `materialize()` moves the records into that order.
 ///
-/// Contract: owned by one wave; `size` records are valid. Shading writes its results at the
-/// record's arrival index, so that the shading order does not affect the ray order.
+/// Contract: owned by one wave; `size` records are valid. Shading stores the result of each record
+/// at its arrival index, so that the shading order does not affect the order of the next rays.
 class ShadingQueue {
  public:
   enum Column : uint32_t {
@@ -27,7 +27,7 @@ class ShadingQueue {
     kColumns
   };
   ShadingQueue() = default;
-  /// `row_words`: 32-bit words per record row.
+  /// `row_words` is the number of 32-bit words in the row of a record.
   ShadingQueue(size_t capacity, size_t row_words)
       : block_(kColumns, capacity),
         moved_(kColumns, capacity),
@@ -54,7 +54,7 @@ class ShadingQueue {
   static constexpr uint32_t kRayKeyShift = 8, kShadowKeyShift = 16;
 
   uint32_t* uints(Column c) const { return block_.uints(c); }
-  /// Returns the row of record `i`, which the rows of later records follow in memory.
+  /// Returns the row of record `i`. The rows of later records follow in memory.
   float* row(size_t i) const { return rows_.floats(0) + i * row_words_; }
 
   /// Moves all records into shading order.

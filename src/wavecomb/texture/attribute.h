@@ -58,8 +58,8 @@ inline void corner_values(const AttributeRecord& record, uint32_t prim, size_t (
 /// Writes `width` (1 to 4) components of attribute `id` to `out`, linearly interpolated between
 /// corners. Lanes whose mesh lacks the attribute, or has fewer components, keep their value.
 ///
-/// Addresses differ by lane, so values are fetched lane by lane; the arithmetic is the same for
-/// packets and scalars.
+/// Each lane may read a different array, so values are loaded one lane at a time. The interpolation
+/// is the same for packets and for scalar lanes.
 template <typename F>
 inline void read_attribute(const AttributeView& view, uint32_t id, uint32_t width,
                            const MeshPosition<F>& mesh_position, const Mask<F>& active, F* out) {

@@ -22,8 +22,9 @@ enum class AttributeRate : uint32_t {
 /// Attribute of a mesh. The attribute records of a mesh are contiguous and end with a record whose
 /// id is kNoAttribute.
 struct AttributeRecord {
-  uint64_t values;   ///< address of floats, `width` per value
-  uint64_t indices;  ///< address of three vertex indices per triangle, for kVertex
+  uint64_t values;  ///< address of an array of floats, with `width` floats per value
+  /// address of an array with three vertex indices per triangle; only for kVertex
+  uint64_t indices;
   uint32_t id;
   AttributeRate rate;
   uint32_t width;

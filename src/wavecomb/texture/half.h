@@ -12,7 +12,7 @@ template <typename F>
 inline F half_to_float(const UInt<F>& half) {
   const UInt<F> exponent = half & 0x7c00u;
   const UInt<F> shifted = (half & 0x7fffu) << 13;
-  // Rebias the exponent by 127 - 15 = 112, and for infinity and NaN twice (31 to 143 to 255).
+  // Add 127 - 15 = 112 to the exponent. For infinity and NaN, add 112 twice: from 31 to 143 to 255.
   const UInt<F> again = select(exponent == UInt<F>(0x7c00u), UInt<F>(112u << 23), UInt<F>(0u));
   const UInt<F> normal = shifted + (112u << 23) + again;
   const F denormal = F(Int<F>(half & 0x3ffu)) * 0x1p-24f;

@@ -10,15 +10,16 @@ namespace wavecomb {
 
 /// Filter footprint of a lookup.
 ///
-/// A trilinear filter is a weighted mean of up to eight texels, four in each of two levels. Reading
-/// one texel, chosen with its filter weight as probability, has the same expectation for an eighth
-/// of the reads (M. Pharr, B. Wronski, M. Salvi, M. Fajardo, "Filtering After Shading With
-/// Stochastic Texture Filtering", Proc. ACM CGIT 7(1), 2024).
+/// A trilinear filter is a weighted mean of up to eight texels, four in each of two levels.
+/// Stochastic filtering reads only one texel, chosen with its filter weight as probability, and
+/// gives the same result on average (M. Pharr, B. Wronski, M. Salvi, M. Fajardo, "Filtering After
+/// Shading With Stochastic Texture Filtering", Proc. ACM CGIT 7(1), 2024).
 template <typename F>
 struct Footprint {
-  F width;                 ///< in uv units
-  bool one_texel = false;  ///< whether to read one random texel instead of all under the filter
-  UInt<F> bits{0u};        ///< random bits, used if one_texel is set
+  F width;  ///< in uv units
+  /// whether to read one random texel instead of all texels under the filter
+  bool one_texel = false;
+  UInt<F> bits{0u};  ///< random bits, used if one_texel is set
 
   /// Makes a footprint for full filtering.
   Footprint(const F& w) : width(w) {}  // NOLINT(google-explicit-constructor)
@@ -31,7 +32,8 @@ struct Footprint {
     f.width = width * factor;
     return f;
   }
-  /// Returns bits first .. first + n - 1 as a number in (0, 1), at the middle of its 2^-n interval.
+  /// Converts the `n` random bits from bit `first` on to a number in (0, 1), at the middle of an
+  /// interval of length 2^-n.
   F number(int first, int n) const {
     const UInt<F> part = (bits >> first) & ((1u << n) - 1u);
     return F(F(Int<F>(part)) + 0.5f) * (1.f / static_cast<float>(1u << n));
@@ -73,7 +75,7 @@ Texel<F> lookup(const TextureView& texture, const F& s, const F& t, const Footpr
                 const Mask<F>& active);
 
 /// Looks up a texture per lane (`id` is an index into `textures`). Calls `lookup` once per distinct
-/// id among the active lanes. Lanes with id kNoTexture give (0, 0, 0, 1).
+/// id among the active lanes. The result is (0, 0, 0, 1) in lanes with id kNoTexture.
 template <typename F>
 Texel<F> lookup(const TextureView* textures, const UInt<F>& id, const F& s, const F& t,
                 const Footprint<F>& footprint, const Mask<F>& active);

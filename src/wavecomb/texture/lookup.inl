@@ -218,8 +218,8 @@ inline Texel<F> lookup_plain(const TextureView& texture, const F& s, const F& t,
                                : bilinear<F>(texture, level, s_in, t_in, active);
   }
   const uint32_t last = texture.level_count - 1;
-  // Lanes that read the finest level have lod 0, so they get the same result in packets with and
-  // without coarse lanes.
+  // Lanes that read only the finest level get lod 0. Their result does not depend on whether other
+  // lanes of the packet read coarser levels.
   const F lod = min(log2(clamp(texels_wide, F(1.f), F(1e9f))), F(static_cast<float>(last)));
   if (footprint.one_texel) {
     const F nearest = max(floor(F(lod + footprint.number(22, 10))), F(0.f));
@@ -241,14 +241,15 @@ inline Texel<F> lookup_plain(const TextureView& texture, const F& s, const F& t,
 }
 
 /// Implements `lookup` for a UDIM texture: calls `lookup_plain` once for each tile that active
-/// lanes read. A point on the border of two tiles belongs to the upper or right one. Filters do not
-/// cross borders.
+/// lanes read. A point on the border of two tiles belongs to the upper or right tile. Filters do
+/// not cross borders.
 template <typename F>
 [[gnu::noinline]] Texel<F> lookup_tiles(const TextureView& texture, const F& s, const F& t,
                                         const Footprint<F>& footprint, const Mask<F>& active) {
   using U = UInt<F>;
   const F zero(0.f), columns(static_cast<float>(TileSet::kColumns));
-  // NaN counts as 0; coordinates far outside stay outside but fit an integer.
+  // NaN becomes 0. Coordinates far outside the tiles are clamped so that they fit an integer and
+  // remain outside.
   const auto clean = [&](const F& x) { return clamp(select(x == x, x, zero), F(-1.f), columns); };
   const F column = floor(clean(s)), row = floor(clean(t));
   const Mask<F> inside =
@@ -274,7 +275,8 @@ template <typename F>
 inline Texel<F> lookup(const TextureView& texture, const F& s, const F& t,
                        const Footprint<F>& footprint, const Mask<F>& active) {
   if (texture.tiles) [[unlikely]] {
-    // Copies the arguments, so that textures without tiles keep them in registers.
+    // Copy the arguments here, so that the compiler keeps the originals in registers for textures
+    // without tiles.
     const F u = s, v = t;
     const Footprint<F> f = footprint;
     const Mask<F> on = active;

@@ -13,11 +13,13 @@ namespace wavecomb {
 namespace {
 
 constexpr uint32_t kTile = TextureView::kTile;
-/// Number of mip levels that one task computes from its rows while they are in the cache.
+/// Maximum number of mip levels that one task computes from a band of rows while the rows are in
+/// the cache.
 constexpr uint32_t kBandLevels = 6;
 
-/// Source texels under destination texel i of n when `size` texels are reduced to n: index of the
-/// first, and the weight of each, proportional to the covered part; weights sum to 1.
+/// Box filter of one destination texel along one axis: index of the first source texel, and the
+/// weights of the source texels that the destination texel covers. The weights are proportional to
+/// the covered fractions and sum to 1.
 struct Box {
   uint32_t first;
   std::vector<float> weights;
@@ -50,7 +52,7 @@ void add_row(const std::vector<Box>& columns, uint32_t channels, float weight, c
   }
 }
 
-/// Averages boxes of 2 x 2 texels of the rows `a` and `b`: n texels at `to`.
+/// Averages blocks of 2 x 2 texels of the rows `a` and `b`, and writes `n` texels to `to`.
 template <uint32_t C>
 void average_rows(const float* a, const float* b, size_t n, float* to) {
   for (size_t x = 0; x < n; ++x)
@@ -69,7 +71,8 @@ class Pyramid {
       : desc_(desc), view_(view), storage_(storage), channels_(view.channels) {
     for (uint32_t n = 1; n < view.level_count; ++n)
       columns_.push_back(make_boxes(view.levels[n - 1].width, view.levels[n].width));
-    // Each row of level band_top_ is one band, so lower levels must divide evenly into bands.
+    // A band is the set of rows that one row of level `band_top_` covers, so the heights of all
+    // finer levels must be even.
     while (band_top_ + 1 < view.level_count && band_top_ < kBandLevels &&
            view.levels[band_top_].height % 2 == 0)
       ++band_top_;
@@ -127,7 +130,7 @@ class Pyramid {
 
   size_t row_size(uint32_t level) const { return size_t{view_.levels[level].width} * channels_; }
 
-  /// Zeroes the tiles at the edges of levels, whose texels outside the image stay 0.
+  /// Zeroes the levels that do not fill their edge tiles, so that texels outside the image are 0.
   void clear_margins() {
     for (uint32_t n = 0; n < view_.level_count; ++n) {
       const TextureLevel& level = view_.levels[n];
@@ -294,7 +297,7 @@ class Pyramid {
   const TextureView& view_;
   std::byte* storage_;
   uint32_t channels_;
-  uint32_t band_top_ = 0;  ///< mip level of which one row makes a band
+  uint32_t band_top_ = 0;  ///< mip level with one row per band
   std::vector<std::vector<Box>> columns_;
 };
 

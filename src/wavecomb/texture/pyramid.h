@@ -12,11 +12,11 @@
 
 namespace wavecomb {
 
-/// Statistics of a mip pyramid, by stored channel.
+/// Statistics of the texel values of a mip pyramid, per stored channel.
 struct PyramidTotals {
   double sum[4] = {0, 0, 0, 0};  ///< sum of the values of the finest level
   uint64_t nonfinite = 0;        ///< number of infinite or NaN values, which became 0
-  /// Range of the linear values of all levels, as stored.
+  /// Range of the stored values of all levels, converted to linear.
   std::array<float, 4> low{kNothing, kNothing, kNothing, kNothing};
   std::array<float, 4> high{-kNothing, -kNothing, -kNothing, -kNothing};
 
@@ -26,22 +26,23 @@ struct PyramidTotals {
 /// Returns the size of one stored value of a texture format in bytes.
 size_t value_bytes(TexelFormat format);
 
-/// Decodes one stored value to linear; `srgb`: the value is sRGB-encoded.
+/// Converts one stored value to a linear value. `srgb` says whether the value is sRGB-encoded.
 float decode_value(const std::byte* p, TexelFormat format, bool srgb);
 
 /// Returns the index of a texel in the storage of a texture, in texels.
 size_t texel_index(const TextureLevel& level, uint32_t x, uint32_t y);
 
 /// Lays out the mip levels of a texture one after another and writes them to `view`, whose format
-/// and channels must be set. Returns the size of all levels in bytes. Throws Error naming desc.name
-/// if texel or word indices would exceed 32-bit lanes: more than 2^32 texels, 8 GiB or more.
+/// and channels must be set. Returns the size of all levels in bytes. Throws Error with the name of
+/// the texture if indices would not fit in 32 bits, which happens with more than 2^32 texels or
+/// with 8 GiB or more.
 uint64_t lay_out(const TextureDesc& desc, TextureView& view);
 
-/// Fills the storage of `view`, whose levels must be laid out, from the caller's pixels. Levels are
-/// computed from one another in float; only stored values are rounded to the format. The result
-/// does not depend on the order in which `for_each` runs its bodies. Scratch memory is a few rows
-/// per thread, and one level of floats of at most 1/4 of the texels (1/4096 if sides are multiples
-/// of 64).
+/// Fills the storage of `view`, whose levels must be laid out, from the caller's pixels. Each level
+/// is computed from float values of the previous level; only stored values are rounded to the
+/// texture format. The result does not depend on the order in which `for_each` runs its bodies.
+/// Temporary memory is a few rows per thread, and one level of floats with at most 1/4 of the
+/// texels (1/4096 if both sides are multiples of 64).
 PyramidTotals build_pyramid(const TextureDesc& desc, const TextureView& view, std::byte* storage,
                             const ForEach& for_each);
 

@@ -13,10 +13,11 @@
 namespace wavecomb {
 
 /// Minimum and maximum of values that are stored as T, with C interleaved channels. Values are
-/// added `kRow` at a time with a separate range per position, so that the comparisons vectorise.
+/// added in rows of up to `kRow` values, and each position in a row has a separate range, so that
+/// the comparisons vectorise.
 ///
-/// Bytes are compared as stored codes, which sort like their values and are smaller. Codes of halfs
-/// do not sort like their values, so halfs are compared before encoding.
+/// 8-bit values are compared as stored codes, since the codes have the same order as the values and
+/// take less memory. Half values are compared as floats, since the order of their codes differs.
 template <typename T, size_t C, size_t kRow>
 class RowRange {
   static constexpr bool kByCode = std::is_same_v<T, uint8_t>;
@@ -28,7 +29,7 @@ class RowRange {
     std::fill(high_, high_ + kRow, std::numeric_limits<Value>::lowest());
   }
 
-  /// Adds `n` values, C <= n <= kRow, and their stored codes.
+  /// Adds a row of `n` values (C <= n <= kRow), given as floats and as stored codes.
   void extend(const float* values, const T* codes, size_t n) {
     const Value* row_values;
     if constexpr (kByCode)

@@ -37,7 +37,8 @@ inline constexpr std::array<float, 256> kSrgbToLinear = detail::make_srgb_table(
 
 namespace detail {
 
-/// Linear value half a code above each 8-bit sRGB code: the rounding boundaries.
+/// Linear values of i + 0.5 for each 8-bit sRGB code i, which are the rounding boundaries between
+/// codes.
 inline constexpr std::array<float, 256> kSrgbSteps = make_srgb_table(0.5);
 
 /// Buckets of floats from 2^-13 to 1 by exponent and 8 mantissa bits. Each bucket holds at most one
@@ -61,7 +62,7 @@ inline constexpr std::array<uint8_t, kSrgbBuckets> kSrgbBucket = make_srgb_bucke
 
 }  // namespace detail
 
-/// Converts a linear value to the nearest 8-bit sRGB code (nearest after encoding); NaN gives 0.
+/// Converts a linear value to an 8-bit sRGB code, rounded to nearest after encoding. NaN gives 0.
 inline uint8_t linear_to_srgb(float linear) {
   const float x = linear > 0x1p-13f ? (linear < 1.f ? linear : 1.f) : 0x1p-13f;
   const uint32_t bits = std::bit_cast<uint32_t>(x) - detail::kSrgbFirstBits;

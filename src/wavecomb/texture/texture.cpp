@@ -36,11 +36,12 @@ void check(const TextureDesc& desc) {
   if (!desc.data) throw Error(where + "has no data");
 }
 
-/// Returns a bound of lookup results for texels in [low, high].
+/// Returns bounds of texture lookup results, given the range of the texel values.
 ///
 /// A filter interpolates a + (b - a) t up to three times with t in [0, 1]. If all texels are equal,
-/// the interpolation is exact; otherwise each step adds at most two rounding errors. No step
-/// crosses 0: for a and b >= 0, the rounded b - a is at least -a, and so is its product with t.
+/// the interpolation is exact; otherwise each step adds at most two rounding errors. Rounding does
+/// not change the sign of a result: for a and b >= 0, the rounded b - a is at least -a, and
+/// therefore so is its product with t.
 TexelRange filtered(const TexelRange& texels) {
   constexpr float kRoundings = 1e-6f;
   TexelRange range = texels;
@@ -54,7 +55,7 @@ TexelRange filtered(const TexelRange& texels) {
   return range;
 }
 
-/// Returns a bound of lookup results for the texels of a pyramid.
+/// Returns bounds of the lookup results of a texture, from the statistics of its mip pyramid.
 TexelRange range_of(const TextureView& view, const PyramidTotals& totals) {
   TexelRange range{{0, 0, 0, 1}, {0, 0, 0, 1}};
   for (size_t c = 0; c < view.channels; ++c) {

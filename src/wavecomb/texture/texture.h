@@ -22,9 +22,9 @@ enum class TexelFormat : uint8_t { kU8, kF16, kF32 };
 enum class Wrap : uint8_t { kRepeat, kClamp, kMirror, kBlack };
 
 /// Pixels provided by the caller. Row 0 is the top of the image; 1 to 4 `channels` are interleaved
-/// (luminance; luminance, alpha; r, g, b; r, g, b, alpha). Halfs are given as 16-bit codes.
+/// (luminance; luminance, alpha; r, g, b; r, g, b, alpha). Half values are passed as 16-bit codes.
 ///
-/// Contract: `data` is read only during Texture's constructor; it needs no alignment.
+/// Contract: `data` must stay valid only during the constructor of Texture and needs no alignment.
 struct TextureDesc {
   std::string name;
   const void* data = nullptr;
@@ -38,17 +38,18 @@ struct TextureDesc {
 /// Mip level within the storage of a texture.
 struct TextureLevel {
   uint32_t width, height;  ///< in texels
-  uint32_t tiles_x;        ///< number of tiles per row of tiles
-  uint32_t offset;         ///< first tile of the level, in texels from the start of the storage
+  uint32_t tiles_x;        ///< number of tiles along the width
+  /// offset of the first tile of the level from the start of the storage, in texels
+  uint32_t offset;
 };
 
 struct TileSet;
 class TileStore;
 
 /// Read-only, non-owning view of a texture for kernels. Texels are stored in square tiles of kTile
-/// x kTile in row-major order; single-channel textures have one value per texel, all others four.
-/// All stored values are finite. The storage has fewer than 2^31 32-bit words and at most 2^32
-/// texels.
+/// x kTile in row-major order; single-channel textures have one value per texel, and all other
+/// textures have four. All stored values are finite. The storage has fewer than 2^31 32-bit words
+/// and at most 2^32 texels.
 struct TextureView {
   static constexpr uint32_t kTile = 8;
   static constexpr uint32_t kMaxLevels = 16;
@@ -65,8 +66,8 @@ struct TextureView {
   const TileSet* tiles = nullptr;
 };
 
-/// Tiles of a UDIM texture. Tile i, numbered 1001 + i, covers s in [i % 10, i % 10 + 1) and t in [i
-/// / 10, i / 10 + 1); null if missing.
+/// Tiles of a UDIM texture. Tile i has the UDIM number 1001 + i and covers s in [i % 10, i % 10 +
+/// 1) and t in [i / 10, i / 10 + 1). Missing tiles are null.
 struct TileSet {
   static constexpr uint32_t kColumns = 10, kCount = 100;
   std::array<const TextureView*, kCount> views{};
@@ -80,8 +81,8 @@ struct TexelRange {
   void add(const TexelRange& other);
 };
 
-/// Returns linear r, g, b, a of the texel at column x and row y (0 is the top) of a level. Slow;
-/// for tools and tests.
+/// Returns linear r, g, b, a of the texel at column x and row y (0 is the top) of a level. This
+/// function is slow; only tools and tests use it.
 std::array<float, 4> texel_at(const TextureView& view, uint32_t level, uint32_t x, uint32_t y);
 
 /// Function that runs body(0) .. body(n - 1) in any order, possibly concurrently.
@@ -99,16 +100,16 @@ class Texture {
   /// Float values are clamped to +-kMaxTexel, so that no filter overflows.
   static constexpr float kMaxTexel = 1e30f;
 
-  /// Builds the pyramid. Builds a texture from an image. Values that are not finite become 0 and
+  /// Builds a texture with its mip pyramid from an image. Values that are not finite become 0 and
   /// are counted. Throws Error naming desc.name if a side is 0 or above kMaxSize, channels or data
   /// are invalid, or the levels need 8 GiB or more or have more than 2^32 texels. `for_each` may
-  /// process rows on several threads without changing the result. `store`: if given, keeps the
-  /// levels within its memory limit.
+  /// process rows on several threads without changing the result. If `store` is not null, it holds
+  /// the levels and limits their memory.
   explicit Texture(const TextureDesc& desc, const ForEach& for_each = in_order,
                    std::shared_ptr<TileStore> store = nullptr);
-  /// Creates a UDIM texture that shares `tiles`, pairs of tile number (1001 to 1100) and texture.
-  /// `missing`: linear r, g, b, alpha of missing tiles. Throws Error naming `name` if there are no
-  /// tiles, a number is out of range or repeated, or a tile is itself a UDIM texture.
+  /// Creates a UDIM texture from `tiles`, pairs of a tile number (1001 to 1100) and a shared
+  /// texture. `missing`: linear r, g, b, alpha of missing tiles. Throws Error naming `name` if
+  /// there are no tiles, a number is out of range or repeated, or a tile is itself a UDIM texture.
   Texture(std::string name,
           const std::vector<std::pair<uint32_t, std::shared_ptr<const Texture>>>& tiles,
           const std::array<float, 4>& missing);
@@ -117,22 +118,22 @@ class Texture {
   const std::string& name() const { return name_; }
   /// Memory of all levels in bytes, without the tiles of a UDIM texture.
   size_t bytes() const { return bytes_; }
-  /// Textures of a UDIM texture, with their tile numbers.
+  /// Returns the tile numbers and tile textures of a UDIM texture.
   const std::vector<std::pair<uint32_t, std::shared_ptr<const Texture>>>& tiles() const {
     return tiles_;
   }
-  /// Memory in bytes that lookups may read: all levels and tiles.
+  /// Returns the size in bytes of all levels, including the tiles of a UDIM texture.
   size_t spanned_bytes() const;
   /// Mean of the finest level, linear r, g, b, a.
   const float* mean() const { return mean_; }
   /// Bounds of all lookups with any coordinates, footprint and filter. The bounds cover the stored
-  /// texels of all levels, and black if the wrap mode returns it outside the image. The range is
-  /// slightly wider than the range of the texels because filters round, unless all texels are
-  /// equal, but the extension never crosses 0.
+  /// texels of all levels, and black if the wrap mode returns it outside the image. Unless all
+  /// texels are equal, the bounds are slightly wider than the range of the texels, since filtering
+  /// rounds. The bounds never have a sign that no texel has.
   const TexelRange& range() const { return range_; }
   /// Number of values of the finest level that were infinite or NaN and became 0.
   uint64_t nonfinite_count() const { return nonfinite_count_; }
-  /// Store that holds the levels; null if they are plain memory.
+  /// Returns the store that holds the levels, or null if the levels are in ordinary memory.
   const std::shared_ptr<TileStore>& store() const { return storage_.get_deleter().store; }
 
  private:

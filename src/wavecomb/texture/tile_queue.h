@@ -8,11 +8,11 @@
 
 namespace wavecomb {
 
-/// Resident tiles in two queues, which decide which tile is evicted next. The queue sees only
-/// misses, because reads of resident tiles cannot be observed. A tile goes to the second queue, for
-/// frequently read tiles, if it is missed again before as many other tiles were evicted as fit in
-/// memory. Tiles of the first queue are evicted first. After 2Q (Johnson and Shasha, VLDB 1994) and
-/// the refault distance of the Linux kernel.
+/// Order in which resident tiles are evicted, kept as two queues of tiles. Only cache misses change
+/// the order, because reads of resident tiles cannot be observed. The second queue is for
+/// frequently read tiles. A loaded tile enters the second queue if fewer tiles were evicted since
+/// its own eviction than fit in memory. Tiles of the first queue are evicted first. The policy
+/// follows 2Q (Johnson and Shasha, VLDB 1994) and the refault distance of the Linux kernel.
 class TileQueue {
  public:
   enum class State : uint8_t { kAbsent, kLoading, kFirst, kSecond };
@@ -22,12 +22,12 @@ class TileQueue {
   size_t size() const { return tiles_.size(); }
   size_t bytes() const { return tiles_.capacity() * sizeof(Tile); }
   State state(uint32_t tile) const { return tiles_[tile].state; }
-  /// Number of tiles that are loading or resident.
+  /// Returns the number of tiles that are loading or resident.
   size_t resident() const { return loading_ + queues_[0].size + queues_[1].size; }
 
   /// Marks an absent tile as loading.
   void begin(uint32_t tile);
-  /// Marks a loading tile as resident. `tile_limit`: number of tiles that fit in memory.
+  /// Marks a loading tile as resident. `tile_limit` is the number of tiles that fit in memory.
   void end(uint32_t tile, size_t tile_limit);
   /// Forgets a tile whose contents will be replaced.
   void drop(uint32_t tile);
@@ -36,7 +36,7 @@ class TileQueue {
 
  private:
   static constexpr uint32_t kNone = 0xffffffffu;
-  /// Maximum fraction of `tile_limit` for the second queue, in eighths.
+  /// Maximum size of the second queue, in eighths of `tile_limit`.
   static constexpr size_t kSecondEighths = 6;
   struct Tile {
     uint32_t older = kNone, newer = kNone;

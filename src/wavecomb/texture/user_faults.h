@@ -9,7 +9,8 @@
 namespace wavecomb {
 
 /// Address space that is filled on demand. A thread that reads an unfilled page blocks until
-/// another thread, which learns of it from wait(), fills it. Requires Linux 5.11 or later.
+/// another thread fills the page. The function wait() returns the addresses of pages to fill.
+/// Requires Linux 5.11 or later.
 ///
 /// Contract: all members may be called concurrently; ranges are multiples of pages. The kernel
 /// cannot read unfilled pages, so never pass them to a system call.
@@ -18,18 +19,18 @@ class UserFaults {
   /// Returns a short reason why the system does not support demand-filled memory, or "" if it does.
   static std::string unsupported_reason();
 
-  /// Throws Error with the text of unsupported_reason() if unsupported.
+  /// If the system does not support demand-filled memory, throws Error with the reason.
   UserFaults();
-  /// Unmaps all memory. Contract of the destructor: no thread waits in wait() or reads the memory.
+  /// Unmaps all memory. No thread may be in wait() or read the memory when the destructor runs.
   ~UserFaults();
   UserFaults(const UserFaults&) = delete;
   UserFaults& operator=(const UserFaults&) = delete;
 
-  /// Maps more read-only address space, which is valid until destruction. Throws Error if no
-  /// address space is left.
+  /// Maps a new range of read-only address space, which is valid until this object is destroyed.
+  /// Throws Error if no address space is left.
   const std::byte* map(size_t bytes);
-  /// Copies `from` to an unfilled range and wakes the threads that wait for it. Returns 0, or errno
-  /// on failure; then part of the range may have been filled.
+  /// Copies `from` to an unfilled range and wakes the threads that wait for it. Returns 0 on
+  /// success and errno on failure. After a failure, part of the range may be filled.
   [[nodiscard]] int fill(const std::byte* at, const std::byte* from, size_t bytes) noexcept;
   /// Resumes threads that wait for a range that cannot be filled. Unfilled pages read as zero.
   /// Needs no memory.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Material costs before the first pass, from synthetic hits or from a fixed model.
+/// Estimates of material costs before the first pass, measured on synthetic hits or computed by a
+/// fixed model.
 #pragma once
 
 #include <vector>
@@ -9,7 +10,7 @@
 
 namespace wavecomb {
 
-/// Triangle with a certain material.
+/// Ids of the triangle of a synthetic hit.
 struct CalibrationHit {
   uint32_t inst, mesh, geom, prim;
 };
@@ -24,8 +25,8 @@ struct CalibrationHits {
   CalibrationHit hits[kMax];
 };
 
-/// Returns triangles of each material that is bound to a visible mesh, distributed over its meshes.
-/// Leaves out materials that are bound to no visible mesh.
+/// Returns synthetic hits for each material that is bound to a visible mesh. The hits of a material
+/// are distributed over the meshes with this material.
 std::vector<CalibrationHits> find_calibration_hits(const Scene& scene);
 
 /// Returns the properties of the scene's materials that policies may use.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Registration of the joint transport, an algorithm that may be combined with camera paths
-/// (path/joint_transport.h). Waves and the reference integrator refer to it only by these names:
+/// (path/joint_transport.h). Waves and the reference integrator use the joint transport only
+/// through these names:
 ///
 ///   WaveContext::joint   data of the render (its Context)
 ///   Wave::joint          data of a worker (its Buffers)

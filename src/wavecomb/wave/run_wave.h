@@ -13,17 +13,17 @@
 namespace wavecomb {
 
 /// Additional stages of camera path waves for a joint transport (path/joint_transport.h). This
-/// class, for renders without a joint transport, does nothing.
+/// class is used in renders without a joint transport, and its functions do nothing.
 struct NoJointStages {
   /// Begins a wave. An implementation may trace the light paths that the camera paths need.
   static void begin(Wave& /*wave*/, const WaveContext& /*context*/, const WaveTask& /*task*/) {}
-  /// Uses the vertices at `depth`, after their shadow rays.
+  /// Processes the path vertices at `depth` after their shadow rays were traced.
   static void use_vertices(Wave& /*wave*/, const WaveContext& /*context*/, uint32_t /*depth*/) {}
-  /// Ends a wave, after its radiance was added to the film.
+  /// Ends a wave. At this point, the film contains the radiance of the wave.
   static void end(const Wave& /*wave*/, const WaveContext& /*context*/, const WaveTask& /*task*/) {}
 };
 
-/// Wave stages of camera paths, through the volumes and media of `Media`.
+/// Wave stages of camera paths. `Media` traces the paths through volumes and media.
 template <typename F, typename Media, typename JointStages>
 struct CameraPaths {
   const Media& media;
@@ -33,9 +33,9 @@ struct CameraPaths {
     tfar = wavecomb::generate<F>(wave, context, task);
     wave.counts.samples += task.path_count();
   }
-  /// Returns whether to trace the camera rays as coherent packets. Rays of a pinhole camera start
-  /// in one point, where packets give the same hits as single rays. Rays from several points would
-  /// differ at edges (canonical-hits.md).
+  /// Returns whether to trace the camera rays as coherent packets. All rays of a pinhole camera
+  /// start in one point; for such rays, coherent packets find the same hits as single rays. For
+  /// rays from several points, hits at edges may differ (canonical-hits.md).
   static bool are_coherent(const WaveContext& context) { return context.camera->is_pinhole(); }
   static ShadeSettings settings(const WaveContext& context) {
     return ShadeSettings(*context.settings);

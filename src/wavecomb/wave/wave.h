@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Wave: the paths of a batch of pixels and samples. One worker traces the paths of a wave to their
-/// end, using only its own buffers.
+/// Wave: a batch of paths, for a number of pixels and samples, that are traced together. One worker
+/// traces the paths of a wave to their end, using only its own buffers.
 #pragma once
 
 #include <memory>
@@ -47,15 +47,15 @@ struct WaveContext {
   const CostSnapshot* costs;           ///< for scheduling policies
   const CostSnapshot* roulette_costs;  ///< costs for cost-aware roulette
   OrderGrid grid;                      ///< grid for ray orders and hit positions
-  Film* film;                          ///< each wave writes only its own pixels
+  Film* film;                          ///< film that waves write; no two waves write the same pixel
   uint32_t traversal_width;
   bool wants_position;                 ///< whether some policy reads position keys
-  bool measures_costs;                 ///< whether batches are timed
-  RayRecorder* recorder;               ///< receives the rays of benchmarks, otherwise null
+  bool measures_costs;                 ///< whether to measure the time of shading batches
+  RayRecorder* recorder;               ///< receives all rays in benchmarks, otherwise null
   const AovTables* aovs = nullptr;     ///< object names and groups for AOVs; null if unused
   HistoryReader* histories = nullptr;  ///< receives vertices of finished paths; null if unused
-  const GuidingView* guide = nullptr;  ///< guiding field that guides bounces, or is in training;
-                                       ///< null without guiding
+  /// guiding field, used or trained by this pass; null without guiding
+  const GuidingView* guide = nullptr;
   bool discards = false;  ///< whether paths only produce `histories` and are not added to the film
   JointTransport::Context joint{};  ///< transport that is combined with camera paths, if any
 
@@ -67,11 +67,12 @@ struct WaveContext {
   bool has_medium_stack() const { return scene.nested_media.media != nullptr; }
   /// Returns whether paths need a shutter time.
   bool moves() const { return scene.has_motion || camera->moves(); }
-  /// Returns whether paths keep the link class of the surface that they left.
+  /// Returns whether each path stores the light link class of the surface from which its ray
+  /// starts.
   bool links() const { return scene.lights.links.members != nullptr; }
   /// Returns whether paths keep the importance of their pixel.
   bool uses_pixel_importance() const { return guide && guide->tiles; }
-  /// Returns the number of vertices to keep for each path.
+  /// Returns the number of path vertices to store for each path.
   uint32_t stored_vertices() const { return histories ? histories->most() : 0; }
   bool orders_rays() const {
     return settings->ray_order != RayOrder::kSlot || settings->shadow_order != RayOrder::kSlot;
@@ -80,8 +81,8 @@ struct WaveContext {
 
 /// Buffers of one worker.
 ///
-/// Contract: used by one thread at a time. The constructor allocates everything; a running wave
-/// allocates nothing.
+/// Contract: used by one thread at a time. The constructor allocates all memory; a running wave
+/// allocates none.
 struct Wave {
   Wave(uint32_t capacity, const WaveContext& context)
       : pool(capacity, context.moves() || context.links() || context.uses_pixel_importance(),
@@ -108,7 +109,8 @@ struct Wave {
         shadow_chooser(kRayOrders),
         joint(capacity, context.joint, context.film->aovs().layout(), context.aovs) {}
   static constexpr size_t kSegmentColumns = 14, kWalkColumns = 36;
-  static constexpr size_t kRayOrders = 4;  ///< slot, morton, morton-octant and direction
+  /// the ray orders slot, morton, morton-octant and direction
+  static constexpr size_t kRayOrders = 4;
 
   PathPool pool;
   PathAovs aovs;
@@ -117,7 +119,7 @@ struct Wave {
   HitBuffer hits;
   ShadingQueue shading;
   ShadowQueue shadows;
-  SoaBlock columns;   ///< columns of ShadingQueueView: throughput, position key, texture key
+  SoaBlock columns;   ///< columns of ShadingQueueView: throughput, position key and texture key
   SoaBlock times;     ///< shutter times of the traced rays, if the scene has motion
   SoaBlock walks;     ///< subsurface random walks (medium/subsurface/walk_queue.h)
   SoaBlock segments;  ///< free flights in volumes (medium/wave/volumes.h)
@@ -128,7 +130,7 @@ struct Wave {
   CostTracker costs;
   Chooser policy_chooser, ray_chooser, shadow_chooser;
   CoherenceCounts coherence;
-  /// Number of shading queues so far, of which some are measured for coherence.
+  /// Number of shading queues so far. Coherence is measured for every seventeenth of them.
   uint32_t queues = 0;
   PhaseClock clock;
   Counts counts;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Table of the compiled vertex kernels, with their lane widths and gains. CMake also reads the
-/// rows of the table.
+/// Table of the compiled vertex kernels, with their lane widths and the reason why each kernel
+/// exists. CMake also reads the rows of the table.
 #pragma once
 
 #include <cstdint>
@@ -10,9 +10,9 @@
 
 namespace wavecomb {
 
-/// Rows X(kind, set, widths, reduced, gain). Each program or variant of the set `set` has one
-/// compile unit for each width, generated from <kind>.lanes.cpp.in. Sanitized builds compile all
-/// units of a program and a width together.
+/// The rows of the table have the form X(kind, set, widths, reduced, gain). Each program or variant
+/// in `set` has one compile unit for each lane width. The compile units are generated from
+/// <kind>.lanes.cpp.in. Sanitized builds compile all units of a program and a width together.
 ///
 /// `set` is `programs` (WAVECOMB_PROGRAMS) or `variants` (the members of kVariants for surfaces).
 /// `widths` is `every` (all widths of the build, and scalar lanes), `ends` (scalar and the widest
@@ -20,13 +20,13 @@ namespace wavecomb {
 ///
 /// `reduced` lists the widths in builds with WAVECOMB_REDUCED_KERNELS, such as sanitized builds.
 /// With `none`, reduced builds run `program` kernels instead. With `first`, the first program has
-/// kernels of every width and the other programs only scalar kernels, which also shade waves of
-/// packets. Reduced builds trace waves through volumes in scalar lanes. `gain` states the measured
-/// benefit over the kernel that would otherwise run, or `-` and a reason if there is no such
-/// kernel.
+/// kernels of every width, and all other programs have only scalar kernels, which then also shade
+/// the packets of waves. Reduced builds trace waves through volumes in scalar lanes. `gain` states
+/// the measured benefit over the kernel that would otherwise run, or `-` and a reason if there is
+/// no such kernel.
 ///
-/// All kernels give bit-identical results: a kernel that lacks a feature (features.h) or a part of
-/// a material runs only where the scene or the material does not use it.
+/// All kernels give bit-identical results. A kernel without some feature (features.h) runs only for
+/// scenes and materials that do not use this feature.
 ///
 /// The table has no separate kernels for camera paths that are combined with light paths (`program`
 /// handles them by a flag), and no plain kernels or variants for light paths, since one general
@@ -36,7 +36,7 @@ namespace wavecomb {
   X(light, programs, ends, scalar, "-: paths from lights, and those of the reference integrator") \
   X(plain, variants, widest, none, "time of a record: 0.73 (openpbr) to 0.96 (diffuse)")
 
-/// Returns whether kernels of a kind are built in `lanes` lanes.
+/// Returns whether the kernels of a row of the table are built for packets of `lanes` lanes.
 constexpr bool has_kernels(std::string_view kind, size_t lanes) {
   constexpr size_t kMax = WAVECOMB_MAX_LANES;
   const auto is_of = [&](std::string_view widths) {
@@ -52,19 +52,20 @@ constexpr bool has_kernels(std::string_view kind, size_t lanes) {
   return false;
 }
 
-/// Returns whether the general kernels of program `program` are built in `lanes` lanes.
+/// Returns whether the general kernels of program `program` are built for packets of `lanes` lanes.
 constexpr bool has_program_kernels(size_t program, size_t lanes) {
   return !WAVECOMB_REDUCED_KERNELS || lanes == 1 || program == 0;
 }
 
-/// Whether waves of packets trace volumes in packets.
+/// Whether waves that use SIMD packets also trace volumes in packets; if not, they use scalar
+/// lanes.
 inline constexpr bool kHasVolumePackets = !WAVECOMB_REDUCED_KERNELS;
 
 /// Whether plain kernels and reduced variants exist for packets of F.
 template <typename F>
 inline constexpr bool kHasPlain = has_kernels("plain", kWidth<F>);
 
-/// Lanes of the kernels for light paths, for any lane width of the wave.
+/// Lane type of the kernels for light paths. It does not depend on the lane width of the wave.
 using LightLanes =
     Lanes<has_kernels("light", WAVECOMB_MAX_LANES) ? size_t{WAVECOMB_MAX_LANES} : size_t{1}>;
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Tables of the kernels of all programs, by program id. Each kernel is compiled in a separate unit
+/// Tables of shading kernels, indexed by program id. Each kernel is compiled in a separate unit
 /// (kernel_matrix.h); this header only declares them.
 #pragma once
 
@@ -28,7 +28,7 @@ using BatchKernels =
     std::array<decltype(&shade_batch<DiffuseBsdf<F>, F, kEverything, JointTransport>),
                kVariantCount>;
 
-/// Uses the kernel of a program for all its variants.
+/// Copies the kernel of each program to all variants of the program.
 template <typename Kernels>
 constexpr Kernels for_variants(Kernels kernels) {
   for (uint32_t v = kProgramCount; v < kVariantCount; ++v)
@@ -74,13 +74,14 @@ constexpr auto vertex_kernels(ProgramList<Bsdf...>) {
 }
 }  // namespace detail
 
-/// Kernels of the programs of a list: shade_batch for waves, by variant (all variants of a program
-/// use its kernel), and shade_vertex for the reference integrator, by ProgramId.
+/// Shading kernels of a list of programs. Waves use `shade_batch`, indexed by variant; all variants
+/// of a program have the same kernel. The reference integrator uses `shade_vertex`, indexed by
+/// ProgramId.
 template <typename F, typename List>
 inline constexpr auto kShadeBatch = detail::batch_kernels<F>(List{});
 template <typename F, typename List>
 inline constexpr auto kShadeVertex = detail::vertex_kernels<F>(List{});
-/// Plain kernels by variant. Only available if kHasPlain.
+/// Plain kernels, indexed by variant. These kernels exist only if kHasPlain is true.
 template <typename F>
 inline constexpr auto kShadePlain =
     detail::plain_batch_kernels<F>(std::make_index_sequence<kVariantCount>());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Wave stage 3a: turns hits and volume events into shading records. Paths that leave the scene or
-/// hit a light's shape end here.
+/// hit the shape of a light end in this stage.
 #pragma once
 
 #include "wavecomb/aov/screen_motion.h"
@@ -16,7 +16,8 @@
 
 namespace wavecomb {
 
-/// Returns the volume events that stopped the flights of a packet.
+/// Returns the volume or mesh medium, and the material, of the volume event in each lane whose free
+/// flight stopped.
 template <typename F>
 VolumeHit<F> volume_hit(const Wave& wave, const WaveContext& context, const UInt<F>& slot,
                         const Flight<F>& flight) {
@@ -36,8 +37,8 @@ VolumeHit<F> volume_hit(const Wave& wave, const WaveContext& context, const UInt
   return volume_event;
 }
 
-/// Records for AOVs how paths passed through volumes and media. `throughput` is the throughput
-/// after the flight.
+/// Records AOVs of ray segments through volumes and media: transmittance and scattering events.
+/// `throughput` is the path throughput at the end of the segment.
 template <typename F>
 void record_segment(Wave& wave, uint32_t depth, const UInt<F>& slot, const Flight<F>& flight,
                     const Color<F>& throughput, const Mask<F>& active) {
@@ -50,7 +51,7 @@ void record_segment(Wave& wave, uint32_t depth, const UInt<F>& slot, const Fligh
     wave.aovs.expressions().template walk<F>(slot, has_scattered);
 }
 
-/// Packet of rays of a wave, from index `i` of the queue on, and what they hit.
+/// Packet of rays from the ray queue, starting at index `i`, with the type of hit of each ray.
 template <typename F>
 struct RayPacket {
   size_t i;
@@ -58,9 +59,9 @@ struct RayPacket {
   UInt<F> slot, inst;
   Vec3<F> o, d;
   F t;  ///< distance of the hit or volume event
-  // Lanes that leave the scene, hit the shape of a light, and hit a surface.
+  // Masks of rays that leave the scene, that hit the shape of a light, and that hit a surface.
   Mask<F> missed, shape, surface;
-  // Row and state of the paths, in the lanes that need them.
+  // Row and state of the paths; loaded only in lanes that need them.
   PathRow<F> path;
   PathState<F> state;
 
@@ -115,7 +116,7 @@ WAVECOMB_INLINE Flight<F> fly_packet(Wave& wave, const ShadeSettings& settings, 
   return flight;
 }
 
-/// Sets `p.state` of the lanes `wanted` from `p.path` and the pool.
+/// Loads `p.state` for the lanes in `wanted`, from `p.path` and from the path pool.
 template <typename F>
 WAVECOMB_INLINE void load_arrival(const Wave& wave, const WaveContext& context, uint32_t depth,
                                   const Mask<F>& wanted, RayPacket<F>& p) {
@@ -157,7 +158,7 @@ WAVECOMB_INLINE void add_ended(Wave& wave, const WaveContext& context,
   }
 }
 
-/// Returns the shutter times of a packet of camera rays; 0 for a camera that does not move.
+/// Returns the shutter times of a packet of camera rays, or 0 if the camera does not move.
 template <typename F>
 WAVECOMB_INLINE F shutter_time(const Wave& wave, const WaveContext& context,
                                const RayPacket<F>& p) {
@@ -166,7 +167,7 @@ WAVECOMB_INLINE F shutter_time(const Wave& wave, const WaveContext& context,
              : F(0.f);
 }
 
-/// Records for AOVs the camera rays that hit the shape of a light.
+/// Records AOVs of camera rays that hit the shape of a light.
 template <typename F>
 WAVECOMB_INLINE void note_shapes(Wave& wave, const WaveContext& context, const RayPacket<F>& p) {
   using U = UInt<F>;
@@ -181,7 +182,8 @@ WAVECOMB_INLINE void note_shapes(Wave& wave, const WaveContext& context, const R
                       p.shape);
 }
 
-/// Surface that the rays of a packet hit. Values are undefined in lanes whose ray hit no surface.
+/// Ids of the surfaces that the rays of a packet hit. Values are undefined in lanes whose ray hit
+/// no surface.
 template <typename F>
 struct HitIds {
   UInt<F> prim, geom, mesh;
@@ -199,7 +201,8 @@ struct HitIds {
   }
 };
 
-/// Returns the materials of the surfaces that a packet hits, or that subsurface random walks leave.
+/// Returns the materials at the hits of a packet. In lanes where a subsurface random walk ends,
+/// this is the material of its exit point.
 template <typename F, typename Media>
 WAVECOMB_INLINE UInt<F> surface_material(const Wave& wave, const SceneView& scene,
                                          [[maybe_unused]] const Media& media, const RayPacket<F>& p,
@@ -213,7 +216,7 @@ WAVECOMB_INLINE UInt<F> surface_material(const Wave& wave, const SceneView& scen
   return material;
 }
 
-/// Records for AOVs the camera rays that hit surfaces.
+/// Records AOVs of camera rays that hit surfaces.
 template <typename F>
 WAVECOMB_INLINE void note_surfaces(Wave& wave, const WaveContext& context, const RayPacket<F>& p,
                                    const HitIds<F>& ids, const UInt<F>& material) {
@@ -229,9 +232,9 @@ WAVECOMB_INLINE void note_surfaces(Wave& wave, const WaveContext& context, const
         p.surface);
 }
 
-/// Reads the ray queue and the hit buffer, and fills the shading queue in the order of the rays.
-/// Paths of a joint transport (`kOfJoint`) do not add environment light or light shapes where they
-/// end.
+/// Reads the ray queue and the hit buffer, and fills the shading queue in the order of the rays. If
+/// `kOfJoint` is true, the paths are light paths of a joint transport, which receive no light from
+/// the environment or from shapes of lights.
 template <typename F, typename Media, bool kOfJoint = false>
 void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settings, uint32_t depth,
              [[maybe_unused]] const Media& media) {

@@ -7,8 +7,9 @@
 
 namespace wavecomb {
 
-/// Fills the pool and the ray queue, where slot = pixel in the task * samples + sample. Returns the
-/// column of far-plane distances, or null if the camera has no far plane.
+/// Fills the path pool and the ray queue. The slot of a path is (index of its pixel in the task) *
+/// samples + sample. Returns the column of far-plane distances, or null if the camera has no far
+/// plane.
 template <typename F>
 const float* generate(Wave& wave, const WaveContext& context, const WaveTask& task) {
   using U = UInt<F>;
@@ -18,7 +19,7 @@ const float* generate(Wave& wave, const WaveContext& context, const WaveTask& ta
   RayQueue& rays = wave.rays;
   const uint32_t n = task.path_count();
   const float inv_samples = 1.f / static_cast<float>(task.samples);
-  float* tfar = wave.shadows.tfar;  // unused until the first shading
+  float* tfar = wave.shadows.tfar;  // this column is unused until the first shading stage
   wave.aovs.clear(n);
   wave.history.clear(n);
   for (uint32_t i = 0; i < n; i += kWidth<F>) {

@@ -30,13 +30,14 @@ UInt<F> texture_key(const SceneView& scene, const MeshHit<F>& hit, const F& cone
   const U cell = morton_2<U>(U(to_int<F>(F((u - fu) * 128.f))) & 0x7fu,
                              U(to_int<F>(F((v - fv) * 128.f))) & 0x7fu);
   const F density = gather_member<F>(scene.meshes, &MeshRecord::uv_density, hit.mesh, active);
-  // Mip level of a 2^15-texel texture, from the exponent of the footprint: floor(log2(width)) + 15.
+  // Mip level of a texture with 2^15 texels per side, floor(log2(width)) + 15, from the exponent of
+  // the footprint width.
   const F width = clamp(F(cone_width * density), F(0x1p-15f), F(1.f));
   const U level = ((float_bits<F>(width) >> 23) - 112u) & 0xfu;
   return select(Mask<U>(has_uv), (tile << 18) | (level << 14) | cell, U(0u));
 }
 
-/// Computes the columns of ShadingQueueView whose bits are set in `wanted`.
+/// Computes the columns of ShadingQueueView that the QueueColumn bits in `wanted` select.
 template <typename F>
 void fill_columns(Wave& wave, const WaveContext& context, uint32_t wanted) {
   using U = UInt<F>;
@@ -59,8 +60,8 @@ void fill_columns(Wave& wave, const WaveContext& context, uint32_t wanted) {
   }
 }
 
-/// Number of packets that shading would run in arrival order, and with the records grouped by
-/// program.
+/// Numbers of packets that shading needs for a queue: with records in arrival order, and with
+/// records grouped by program.
 struct PacketEstimate {
   double arrival = 0, grouped = 0;
 };
@@ -80,18 +81,19 @@ inline PacketEstimate estimate_packets(std::span<const uint32_t> program, size_t
   return e;
 }
 
-/// Largest number of policies between which a render chooses.
+/// Maximum number of scheduling policies among which a render can choose.
 inline constexpr size_t kMaxPolicies = 16;
 
-/// Policy that was used, as feedback for the chooser.
+/// Scheduling policy of a shading queue, with the work and time that the policy chooser needs as
+/// feedback.
 struct OrderChoice {
   size_t arm = 0;  ///< index in WaveContext::policies
   Work work;
   double prepare_ns = 0;
 };
 
-/// Runs keys -> stable sort -> sorted_indices -> materialize, each in a separate phase of the
-/// clock.
+/// Orders the shading queue: computes sort keys, sorts the indices, and moves the records. Measures
+/// the time of each step separately.
 template <typename F>
 OrderChoice order_records(Wave& wave, const WaveContext& context, uint32_t depth) {
   using Clock = PhaseClock::Clock;
@@ -141,8 +143,9 @@ OrderChoice order_records(Wave& wave, const WaveContext& context, uint32_t depth
   return choice;
 }
 
-/// Adds every seventeenth queue to the coherence statistics, in shading order. The interval is a
-/// prime number, since waves of 8 or 16 depths would otherwise always measure the same depth.
+/// Adds every seventeenth shading queue to the coherence statistics, with records in shading order.
+/// The interval is a prime number, since waves of 8 or 16 depths would otherwise always measure the
+/// same depth.
 template <typename F>
 void watch_coherence(Wave& wave, const WaveContext& context) {
   if (wave.queues % 17 != 1) return;

@@ -8,7 +8,7 @@
 
 namespace wavecomb {
 
-/// Returns the 30-bit Morton code of points on the grid.
+/// Returns the 30-bit Morton codes of points, quantised to the grid.
 template <typename F>
 inline UInt<F> position_key(const OrderGrid& grid, const Vec3<F>& p) {
   using U = UInt<F>;
@@ -19,10 +19,11 @@ inline UInt<F> position_key(const OrderGrid& grid, const Vec3<F>& p) {
   return morton_3<U>(axis(p.x, 0), axis(p.y, 1), axis(p.z, 2));
 }
 
-/// Length from which a direction's component counts as long, about 1 / sqrt(3).
+/// Threshold above which a component of a unit direction counts as long; about 1 / sqrt(3).
 inline constexpr float kLong = 0.6f;
 
-/// Returns six bits of a direction: its octant, and which of its components are long.
+/// Returns a six-bit key of a direction: three bits for its octant, and one bit for each component
+/// above `kLong`.
 template <typename F>
 inline UInt<F> direction_key(const Vec3<F>& d) {
   using U = UInt<F>;
@@ -33,8 +34,8 @@ inline UInt<F> direction_key(const Vec3<F>& d) {
 }
 
 /// Computes the sort keys of the rays in the pool rows of `slot`: the Morton code of the origin,
-/// preceded by the octant of the direction if `by_octant`. Rows of paths and of shadow rays both
-/// start with origin and direction.
+/// preceded by the octant of the direction if `by_octant`. `rows` may hold path rows or shadow ray
+/// rows, since both start with origin and direction.
 template <typename F>
 void ray_keys(const float* rows, const uint32_t* slot, size_t n, const OrderGrid& grid,
               bool by_octant, uint64_t* keys) {
@@ -45,8 +46,8 @@ void ray_keys(const float* rows, const uint32_t* slot, size_t n, const OrderGrid
     const Mask<F> active = first_lanes<F>(n - i);
     const auto ray = load_head<RayHead, PathRow, F>(rows, load<U>(slot + i), active);
     U key = position_key<F>(grid, ray.o);
-    // The octant takes the two spare bits and replaces the lowest bit of the Morton code, which
-    // matters less.
+    // The octant needs three bits: the two unused bits of the key and the lowest bit of the Morton
+    // code, which matters less.
     if (by_octant) key = ((direction_key<F>(ray.d) >> 3) << 29) | (key >> 1);
     store(lanes, key);
     const size_t m = std::min(kWidth<F>, n - i);
@@ -54,7 +55,7 @@ void ray_keys(const float* rows, const uint32_t* slot, size_t n, const OrderGrid
   }
 }
 
-/// Ray order that was used, as feedback for the chooser.
+/// Order of a ray queue, with the work and time that the chooser of ray orders needs as feedback.
 struct RayOrderChoice {
   bool chosen = false;
   size_t arm = 0;
@@ -62,8 +63,8 @@ struct RayOrderChoice {
   double prepare_ns = 0;
 };
 
-/// Sorts the queue's slots by `order`; for kAuto `chooser` decides. `rows` holds the rays of the
-/// pool.
+/// Sorts the slots in `queue` by the ray order `order`. If `order` is kAuto, `chooser` selects the
+/// ray order. `rows` contains the rays of all slots.
 template <typename F, typename Queue>
 RayOrderChoice order_rays(Wave& wave, const WaveContext& context, uint32_t depth, RayOrder order,
                           Chooser& chooser, const float* rows, Queue& queue) {
@@ -100,7 +101,7 @@ RayOrderChoice order_rays(Wave& wave, const WaveContext& context, uint32_t depth
   return choice;
 }
 
-/// Reports the traversal time to the chooser.
+/// Reports the traversal time of a ray queue to the chooser of ray orders.
 inline void learn_order(Chooser& chooser, uint32_t depth, const RayOrderChoice& choice,
                         PhaseClock::Clock::time_point start) {
   if (!choice.chosen) return;

@@ -8,12 +8,12 @@
 
 namespace wavecomb {
 
-/// Records of the queue in shading order, from `i` to at most `end`.
+/// Packet of shading records, in shading order, from index `i` to at most `end`.
 template <typename F>
 struct RecordPacket {
   using U = UInt<F>;
   Mask<F> active;
-  U arrival;  ///< index in arrival order, at which outcomes are stored
+  U arrival;  ///< index of each record in arrival order; outcomes are stored at this index
   ShadingRecord<F> record;
   U material;
 
@@ -27,7 +27,8 @@ struct RecordPacket {
                              : load<U>(queue.uints(Q::kMaterial) + i);
   }
 
-  /// Stores which paths continue along `next` and which have a shadow ray along `shadow`.
+  /// Stores the shading outcomes: which paths continue, in direction `next`, and which paths have a
+  /// shadow ray, in direction `shadow`.
   void store(const ShadingQueue& queue, const Mask<F>& alive, const Vec3<F>& next,
              const Mask<F>& has_shadow, const Vec3<F>& shadow) const {
     using Q = ShadingQueue;

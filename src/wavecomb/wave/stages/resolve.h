@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Wave stage 5: adds the radiance of the slots to the film, the samples of a pixel in sample
-/// order.
+/// Wave stage 5: adds the radiance of all paths to the film. The samples of a pixel are added in
+/// sample order.
 #pragma once
 
 #include <cmath>
@@ -12,15 +12,15 @@ namespace wavecomb {
 
 namespace detail {
 
-/// Adds the rows of slots [first, end) to `sum`, word by word, in slot order.
+/// Adds the rows of slots [first, end) to `sum`, value by value and in slot order.
 template <size_t N>
 inline void add_rows(const float* rows, size_t first, size_t end, double (&sum)[N]) {
   for (size_t s = first; s < end; ++s)
     for (size_t c = 0; c < N; ++c) sum[c] += double{rows[s * N + c]};
 }
 
-/// Adds the rows of slots [first, end) to the error sums of `pixel`, before they are added to the
-/// pixel.
+/// Adds the radiance of slots [first, end) to the error sums of `pixel`. Must run before the film
+/// adds these samples to the pixel.
 inline void add_errors(const float* rows, size_t first, size_t end, const Film::Pixel& pixel,
                        ErrorSums& errors) {
   double sum[3] = {pixel.r, pixel.g, pixel.b};

@@ -8,11 +8,12 @@
 
 namespace wavecomb {
 
-/// Largest number of records in a batch. The columns of a batch fit into the first-level cache, and
-/// time is measured once per batch.
+/// Largest number of records in a batch. The columns of a batch fit into the L1 cache. Time is
+/// measured once per batch.
 inline constexpr size_t kMaxBatch = 256;
 
-/// Returns the end of the batch that starts at `begin`, a run of records of one program.
+/// Returns the end of the batch that starts at `begin`. All records of a batch have the same
+/// program.
 template <typename F>
 size_t batch_end(const ShadingQueue& queue, size_t begin) {
   using U = UInt<F>;
@@ -29,12 +30,12 @@ size_t batch_end(const ShadingQueue& queue, size_t begin) {
   return limit;
 }
 
-/// Returns the index of record i of the shading order in the queue's columns.
+/// Returns the column index of the record at position `i` of the shading order.
 inline size_t record_index(const ShadingQueue& queue, size_t i) {
   return queue.ordered ? queue.sorted_indices[i] : i;
 }
 
-/// Charges the time of a batch to the materials of its records.
+/// Adds the time of a batch to the measured costs of the materials of its records.
 inline void charge_batch(Wave& wave, size_t begin, size_t end,
                          PhaseClock::Clock::time_point start) {
   const double ns =
@@ -46,7 +47,8 @@ inline void charge_batch(Wave& wave, size_t begin, size_t end,
   wave.costs.charge({materials.data(), end - begin}, ns);
 }
 
-/// Adds the time of a batch to the paths of its records, or their modelled costs, for the cost AOV.
+/// For the cost AOV, adds either the measured time of a batch or the modelled costs of its
+/// materials to the paths of the batch.
 inline void spread_batch(Wave& wave, const WaveContext& context, size_t begin, size_t end,
                          PhaseClock::Clock::time_point start) {
   const ShadingQueue& queue = wave.shading;
@@ -96,8 +98,8 @@ void shade(Wave& wave, const WaveContext& context, const ShadeSettings& settings
   }
 }
 
-/// Appends the rays with outcome `what`, of the packet of records at `i`, to `list`, which already
-/// holds `n` rays.
+/// Appends rays of the records from index `i` to `list`, for records whose outcome includes `what`.
+/// `n` is the number of rays in `list`.
 template <typename F, typename List>
 WAVECOMB_INLINE void list_rays(const ShadingQueue& queue, size_t i, List& list, size_t& n,
                                ShadingQueue::Outcome what, uint32_t shift) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Wave stage 3c for one program: shades a batch of its records in packets.
+/// Wave stage 3c for one program: shades a batch of records in packets.
 #pragma once
 
 #include "wavecomb/path/vertex.h"
@@ -8,8 +8,8 @@
 
 namespace wavecomb {
 
-/// Runs the steps of a vertex. Packet kernels inline the steps; scalar kernels call the function of
-/// the reference integrator.
+/// Shades a packet of path vertices. Packet kernels inline the shading steps; scalar kernels call
+/// shade_vertex(), the function of the reference integrator.
 template <typename Bsdf, typename Joint, typename F, uint32_t kFeatures>
 WAVECOMB_INLINE VertexResult<F> shade_one(const Vertex<F, kFeatures>& v,
                                           typename Joint::template Coupling<F>& joint) {
@@ -41,8 +41,8 @@ WAVECOMB_INLINE PathState<F> load_state(const PathPool& pool, const WaveContext&
   return state;
 }
 
-/// Adds the emission of a packet's vertices to their paths. Returns the light groups of the light
-/// samples; 0 without AOVs of lights.
+/// Adds the emission at the vertices of a packet to the radiance of their paths. Returns the light
+/// group of each light sample, or 0 if the render has no light group AOVs.
 template <typename F, uint32_t kFeatures>
 WAVECOMB_INLINE UInt<F> add_emitted(Wave& wave, const VertexResult<F>& v, const SampleKey<F>& key,
                                     const UInt<F>& slot, uint32_t depth, const VertexAovs<F>& aovs,
@@ -83,9 +83,10 @@ WAVECOMB_INLINE void store_rays(const PathPool& pool, const VertexResult<F>& v,
     store_row<PathRow, F>(pool.paths, slot, path_row<kMayEnter, F>(v.next, key), v.alive);
 }
 
-/// Shades records [begin, end) of the shading order, all of variant `Bsdf`, one packet at a time.
-/// The next ray of a path overwrites its last ray in the pool, and outcomes are stored in arrival
-/// order. `Joint` is the transport that may be combined with camera paths (path/joint_transport.h).
+/// Shades records [begin, end) of the shading order, one packet at a time. All of these records
+/// have the variant `Bsdf`. In the path pool, the next ray of a path overwrites its previous ray.
+/// Outcomes are stored in arrival order. `Joint` is the transport that may be combined with camera
+/// paths (path/joint_transport.h).
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Joint>
 void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& settings,
                  uint32_t depth, size_t begin, size_t end) {

@@ -7,7 +7,7 @@
 
 namespace wavecomb {
 
-/// Copies the first fields of the queued slots' rows into columns.
+/// Copies the first fields of the rows of all queued slots into the columns of a queue.
 template <template <typename> class Head, template <typename> class Row, typename F, typename Queue,
           size_t C>
 void fetch(const Queue& q, const float* rows, float* const (&columns)[C]) {
@@ -33,8 +33,8 @@ void fetch_shadows(Wave& wave) {
                                   {q.ox, q.oy, q.oz, q.dx, q.dy, q.dz, q.tfar, q.r, q.g, q.b});
 }
 
-/// Copies the shutter times of the queued slots' paths into a column. Returns null if the scene has
-/// no motion.
+/// Copies the shutter times of the paths in a queue into a column. Returns null if the scene has no
+/// motion.
 template <typename F, typename Queue>
 const float* fetch_times(Wave& wave, const Queue& q) {
   float* times = wave.times.floats(0);
@@ -47,8 +47,9 @@ const float* fetch_times(Wave& wave, const Queue& q) {
   return times;
 }
 
-/// Returns the presence keys of rays at `depth`. Shadow rays use different random numbers than path
-/// rays. With `uses_linking`, each shadow ray hits only the geometry in its shadow set.
+/// Returns the keys of the random numbers that decide stochastic presence for rays at `depth`.
+/// Shadow rays use different random numbers than path rays. With `uses_linking`, each shadow ray
+/// hits only the geometry in its shadow set.
 inline PresenceKeys presence_keys(const PathPool& pool, uint32_t depth, bool shadow,
                                   bool uses_linking = false) {
   const auto* path = reinterpret_cast<const PathRow<float>*>(pool.paths);
@@ -95,8 +96,9 @@ void occlude(Wave& wave, const WaveContext& context, uint32_t depth, bool uses_l
   wave.counts.add_shadow_rays(depth, q.size);
 }
 
-/// Adds the contributions of unblocked shadow rays to their slots, attenuated by volumes and media.
-/// A slot has at most one shadow ray, so the order of the queue does not matter.
+/// Adds the contributions of unblocked shadow rays to the radiance of their paths, multiplied by
+/// the transmittance of volumes and media. A slot has at most one shadow ray, so the order of the
+/// queue does not matter.
 template <typename F, typename Media>
 void shadow(Wave& wave, const WaveContext& context, uint32_t depth,
             [[maybe_unused]] const Media& media) {
@@ -125,7 +127,7 @@ void shadow(Wave& wave, const WaveContext& context, uint32_t depth,
       }
     }
     if (wave.pool.shadow_tints) [[unlikely]] {
-      // Coloured shadows: a blocked ray keeps a fraction of the light.
+      // With shadow tints, a blocked shadow ray still contributes a fraction of its light.
       const Mask<F> blocked = first_lanes<F>(q.size - i) & not_(active);
       const Color<F> tint = load_row<RadianceRow, F>(wave.pool.shadow_tints, slot, blocked).sum;
       c = select<F>(blocked, c * tint, c);
