@@ -152,7 +152,7 @@ struct SceneMaterials {
   /// needs a medium stack depends on `in_glass`.
   SceneMaterials(std::vector<Material> materials, std::shared_ptr<const GraphSet> graphs,
                  std::span<const TexturePtr> textures, uint32_t exit_material, bool in_glass);
-  /// Number of materials without the one for collisions inside meshes.
+  /// Returns the materials without the one for collisions inside meshes.
   std::vector<Material> given() const;
 
   /// materials as passed to the constructor, before simplification
