@@ -116,8 +116,9 @@ def test_an_object_moves_when_the_drag_ends(moved, qtbot):
     )
     assert np.allclose(after[0][1:], before[0][1:], atol=1e-4), "in the plane of the view"
     moved.scene.edits.undo()
-    bounds = moved.session.scene.bounds_of
-    qtbot.waitUntil(lambda: np.allclose(bounds(BALL), before, atol=1e-4), timeout=20000)
+    qtbot.waitUntil(
+        lambda: np.allclose(moved.session.scene.bounds_of(BALL), before, atol=1e-4), timeout=20000
+    )
     assert moved.scene.edits.lines() == []
 
 
