@@ -28,8 +28,7 @@ class Buffer {
 
   uint64_t size() const { return size_; }
 
-  /// Returns a pointer to `count` structures at an offset of the buffer. Throws BrokenFile if the
-  /// buffer is too small.
+  /// Returns `count` structures at an offset. Throws BrokenFile if the buffer is too small.
   template <typename T>
   const T* at(uint64_t offset, uint64_t count = 1) const {
     if (offset > size_ || offset % alignof(T) != 0 || count > (size_ - offset) / sizeof(T))
@@ -91,8 +90,7 @@ class NanoTreeTraversal {
 
   const Value& background() const { return root_->mBackground; }
 
-  /// Calls `on_tile(origin, edge, value)` for active tiles and `on_leaf(origin, offset)` for
-  /// leaves, in the order of OpenVDB's trees.
+  /// Calls `on_tile(origin, edge, value)` for active tiles, `on_leaf(origin, offset)` for leaves.
   template <typename OnTile, typename OnLeaf>
   void walk(OnTile&& on_tile, OnLeaf&& on_leaf) const {
     uint64_t nodes = 0;
@@ -136,8 +134,8 @@ class NanoTreeTraversal {
     return found;
   }
 
-  /// Visits the children and active tiles of the inner node at the offset `at`. The node has
-  /// 2^`Log2` entries along each axis, and an entry covers `edge` voxels along each axis.
+  /// Visits the children and active tiles of the inner node at the offset `at`. Along each axis the
+  /// node has 2^`Log2` entries of `edge` voxels.
   template <typename Node, int Log2, typename OnTile, typename OnChild>
   void visit_inner(uint64_t at, const Origin& origin, int32_t edge, OnTile&& on_tile,
                    OnChild&& on_child) const {
@@ -163,8 +161,7 @@ class NanoTreeTraversal {
   const Root* root_ = nullptr;
 };
 
-/// NanoVDB grid whose voxel values have the type `Value`. A function that was chosen for the grid's
-/// build type reads its leaf nodes.
+/// NanoVDB grid of voxel type `Value`. A function for the grid's build type reads its leaf nodes.
 template <typename Value>
 class NanoGrid {
  public:
@@ -292,8 +289,7 @@ const char* kind_of(const nanovdb::GridData& data) {
   }
 }
 
-/// Returns the header of a grid. Throws `BrokenFile` if the header is invalid or does not match the
-/// grid's entry in the file's table.
+/// Returns the header of a grid. Throws `BrokenFile` unless it matches the file's table of grids.
 const nanovdb::GridData& head_of(const Buffer& whole, uint32_t type) {
   const auto* data = whole.at<nanovdb::GridData>(0);
   if (std::memcmp(&data->mMagic, "NanoVDB", 7) != 0)
@@ -305,8 +301,7 @@ const nanovdb::GridData& head_of(const Buffer& whole, uint32_t type) {
   return *data;
 }
 
-/// Calls `use` with the value type and leaf node type of the nanovdb::GridType `type`. Returns
-/// false if grids of this type are not supported.
+/// Calls `use` with the value and leaf node types of a nanovdb::GridType; false if not supported.
 template <typename Use>
 bool with_build(uint32_t type, Use&& use) {
   switch (static_cast<nanovdb::GridType>(type)) {

@@ -141,8 +141,8 @@ class Renderer:
             return
         shot = self.job.shot(image)
         x, y = shot.region[:2]
-        pixel = {"region": (x, y, x + 1, y + 1), "crop": True, "threads": self._threads}
-        settings = _core.Settings(**{**shot.settings, **pixel})
+        pixel = {"region": (x, y, x + 1, y + 1), "crop": True}
+        settings = _core.Settings(**{**self._chosen(shot), **pixel})
         picture, _ = self._render(Task(image, 0), shot, settings, None)
         save_plan(path, key, picture.learned)
 
@@ -157,13 +157,17 @@ class Renderer:
             self._plan = image, learned
         return self._plan[1] or None
 
+    def _chosen(self, shot: Shot) -> dict[str, Any]:
+        """Returns the settings of a shot with the number of threads of this renderer."""
+        return {**shot.settings, "threads": self._threads or shot.settings.get("threads", 0)}
+
     def _settings(
         self, image: int, shot: Shot, tile: Rectangle, checks: int
     ) -> tuple[Settings, Rectangle, int]:
         """Returns a tile's settings, its rectangle with border, and the border's error checks."""
         from wavecomb import _core
 
-        chosen = {**shot.settings, "threads": self._threads or shot.settings.get("threads", 0)}
+        chosen = self._chosen(shot)
         if self.job.tile_count(image) == 1:
             return _core.Settings(**chosen), shot.window, 0
         checks = error_checks_for(shot, checks)

@@ -8,12 +8,13 @@ task needs it, so tasks run one at a time.
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
 import sys
 import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -155,18 +156,15 @@ def render_tiles(
             path, key = of.part(task), of.job.tile_key(task, machine)
             tile = of.job.rectangles(image)[number]
             try:
-                if not has_tile(path, key, tile, checks):
-                    renderer.render(task, path, machine, checks, plan=of.plan(image))
-                out["done"].append((image, number))
+                with _noting_full_disk(out, path, machine):
+                    if not has_tile(path, key, tile, checks):
+                        renderer.render(task, path, machine, checks, plan=of.plan(image))
+                    out["done"].append((image, number))
             except Stopped:
                 break
             except WavecombError as error:
                 out["failed"].append((image, number, str(error)))
-            except OSError as error:
-                if not is_full(error, path):
-                    raise
-                out["full"] = str(error)
-                _withdraw(machine)
+            if out["full"]:
                 break
     out["warnings"] = list(renderer.warnings)
     out["seconds"] = time.monotonic() - started
@@ -187,15 +185,8 @@ def plan_image(folder: str, maps: list[Pair], job: str, machine: str, image: int
     with progress:
         renderer, of = _renderer(folder, maps, job)
         path = of.plan(image)
-        try:
+        with contextlib.suppress(Stopped), _noting_full_disk(out, path, machine):
             renderer.plan(image, path, machine)
-        except Stopped:
-            pass
-        except OSError as error:
-            if not is_full(error, path):
-                raise
-            out["full"] = str(error)
-            _withdraw(machine)
     out["warnings"] = list(renderer.warnings)
     return out
 
@@ -216,13 +207,9 @@ def assemble_image(
     out["worker"] = _begin()
     with progress:
         of = _folder(folder, maps, job)
-        try:
+        path = Path(of.job.place(of.job.names(image)["output"]))
+        with _noting_full_disk(out, path, machine):
             out |= finish_image(of, image, machine, get_worker().state.nthreads)
-        except OSError as error:
-            if not is_full(error, Path(of.job.place(of.job.names(image)["output"]))):
-                raise
-            out["full"] = str(error)
-            _withdraw(machine)
     return out
 
 
@@ -274,6 +261,18 @@ def is_full(error: OSError, path: Path) -> bool:
     except OSError:
         return False
     return found.f_bavail * found.f_frsize < _MIN_FREE
+
+
+@contextlib.contextmanager
+def _noting_full_disk(out: dict[str, Any], path: Path, machine: str) -> Iterator[None]:
+    """Stores in ``out["full"]`` that the disk of ``path`` is full, and withdraws the worker."""
+    try:
+        yield
+    except OSError as error:
+        if not is_full(error, path):
+            raise
+        out["full"] = str(error)
+        _withdraw(machine)
 
 
 def _begin() -> str:
