@@ -68,10 +68,10 @@ const auto* leaf_at(const Buffer& buffer, uint64_t at) {
   return leaf;
 }
 
-/// Traversal of the nodes of a NanoVDB grid, starting at the root. The template depends only on the
-/// type of voxel values, so that grids with and without quantised leaves use the same code. Throws
-/// `BrokenFile` after visiting more nodes than fit into the buffer, since node offsets of a broken
-/// file may form a cycle.
+/// Traversal of the nodes of a NanoVDB grid from the root, in the order of OpenVDB's trees. The
+/// template depends only on the type of voxel values, so that grids with and without quantised
+/// leaves use the same code. Throws `BrokenFile` after visiting more nodes than fit into the
+/// buffer, since node offsets of a broken file may form a cycle.
 template <typename Value>
 class NanoTreeTraversal {
  public:
