@@ -56,7 +56,7 @@ class PathTracer : PathRecorder {
     radiance_ = {};
     const uint32_t last = trace_path(*task.pixels, task.first_sample);
     aovs_.end_path(last, radiance(), 1);
-    if (history_) context_.histories->ended(history_, radiance(), task);
+    if (context_.histories) context_.histories->ended(history_, radiance(), task);
     const F exposure = context_.camera->exposure;
     if (exposure != 1) {
       radiance_.sum *= exposure;

@@ -61,7 +61,7 @@ struct CameraPaths {
   static void resolve(Wave& wave, const WaveContext& context, const WaveTask& task,
                       uint32_t depth) {
     wave.aovs.end_path(depth, wave.pool.radiance, task.path_count());
-    if (wave.history) context.histories->ended(wave.history, wave.pool.radiance, task);
+    if (context.histories) context.histories->ended(wave.history, wave.pool.radiance, task);
     if (context.discards) return;
     wavecomb::resolve(wave, context, task);
     JointStages::end(wave, context, task);

@@ -14,8 +14,7 @@
 ///   S(a) = sum of x^2 p / (a p_b + (1 - a) p_g).
 /// The candidates for a are the values in kBsdfShares; a = 1 is chosen where guiding does not help.
 ///
-/// Sums are computed in the order of the training records, so equal records give bitwise equal
-/// fields.
+/// Equal records give bitwise equal fields, on any number of threads (field_builder.h).
 #pragma once
 
 #include <array>
@@ -25,33 +24,17 @@
 
 #include "wavecomb/core/vec3.h"
 #include "wavecomb/guiding/field/field_arrays.h"
+#include "wavecomb/guiding/field/field_statistics.h"
 #include "wavecomb/guiding/field/field_view.h"
+#include "wavecomb/guiding/field/grid.h"
 #include "wavecomb/guiding/roulette.h"
 #include "wavecomb/guiding/training_sample.h"
 
 namespace wavecomb {
 
-/// Grid that divides the bounds of the scene into 2^kGuidingBits steps per axis.
-struct GuidingGrid {
-  float lo[3] = {}, scale[3] = {};
-
-  /// `low` and `high` are the corners of the bounds, with low <= high.
-  GuidingGrid(const float (&low)[3], const float (&high)[3]);
-};
-
 /// Packs the position and surface axis of a bounce: the Morton code of the grid position of p, and
 /// in the lowest three bits the guiding_axis of the surface.
 uint64_t bounce_position_key(const GuidingGrid& grid, const Vec3<float>& p, uint32_t axis);
-
-/// Statistics of a guiding field.
-struct GuidingFieldStatistics {
-  uint64_t records = 0;  ///< number of training bounces that contribute light
-  uint32_t cells = 0, regions = 0, guided_regions = 0;
-  /// Mean probability that the field samples a bounce, and ratio of the second moments of the
-  /// mixture and of the BSDF alone. Both values are weighted by the contribution of bounces to the
-  /// image.
-  double guided_share = 0, moment_ratio = 1;
-};
 
 /// A guiding field and the arrays that kernels read. The field is immutable except for
 /// compute_survival().
@@ -85,8 +68,6 @@ class GuidingField {
   const GuidingFieldArrays& parts() const { return parts_; }
 
  private:
-  friend class GuidingFieldBuilder;
-
   GuidingGrid grid_;
   GuidingFieldArrays parts_;
   GuidingFieldStatistics facts_;

@@ -20,6 +20,37 @@ constexpr double kUncounted = 0.02;
 /// Paths whose vertices are held at once: about 30 MB.
 constexpr size_t kPathsAtOnce = 65'536;
 
+/// Stores the luminance of each path of a pilot render. The paths store no vertices, so that they
+/// run in the same kernels as the paths of the image.
+///
+/// Contract: workers may call ended() concurrently for different paths.
+class LuminanceReader final : public HistoryReader {
+ public:
+  /// `pixels` outlives the reader. Each pixel has the samples [0, samples).
+  LuminanceReader(std::span<const uint32_t> pixels, uint32_t samples)
+      : pixels_(pixels), samples_(samples), luminances_(pixels.size() * samples) {}
+
+  uint32_t most() const override { return 0; }
+  void ended(const PathHistory& /*history*/, const float* radiance, const WaveTask& task) override {
+    for (uint32_t slot = 0; slot < task.path_count(); ++slot) {
+      const auto pixel = static_cast<size_t>(task.pixels - pixels_.data()) + slot / task.samples;
+      luminances_[pixel * samples_ + task.first_sample + slot % task.samples] =
+          luminance(load_row<RadianceRow, float>(radiance, slot, true).sum);
+    }
+  }
+  /// Returns the mean luminance of pixel `i`, summed up in the order of samples.
+  double mean(size_t i) const {
+    double sum = 0;
+    for (uint32_t s = 0; s < samples_; ++s) sum += double{luminances_[i * samples_ + s]};
+    return sum / samples_;
+  }
+
+ private:
+  std::span<const uint32_t> pixels_;
+  uint32_t samples_;
+  std::vector<float> luminances_;
+};
+
 /// Returns the cost of the work that an integrator has done, in rays traced through a BVH.
 double cost_of(const Integrator& integrator, const WaveSetup& waves, bool has_list,
                bool uses_field) {
@@ -77,27 +108,34 @@ double trace_training_paths(WaveContext context, const WaveSetup& waves,
   return cost_of(*integrator, waves, context.accel->has_list(), context.guide != nullptr);
 }
 
+void PilotRender::append(const PilotRender& other) {
+  differences.insert(differences.end(), other.differences.begin(), other.differences.end());
+  cost += other.cost;
+}
+
 PilotRender render_pilot(WaveContext context, Settings settings, const WaveSetup& waves,
                          const PilotRenderPlan& plan, const std::function<bool()>& stopped) {
-  const std::span<const uint32_t> pixels = plan.pixels;
-  const uint32_t samples = plan.samples;
+  PassPlan pass;
+  pass.pixels.assign(plan.pixels.begin(), plan.pixels.end());
+  pass.batches.push_back({0, pass.pixels.size(), 0, plan.samples});
+  LuminanceReader reader(pass.pixels, plan.samples);
   PilotRender pilot;
-  pilot.samples = samples;
-  pilot.differences.resize(pixels.size());
+  pilot.samples = plan.samples;
+  pilot.differences.resize(pass.pixels.size());
   context.settings = &settings;
   context.guide = plan.guide;
+  context.histories = &reader;
+  const std::unique_ptr<Integrator> integrator =
+      make_integrator(settings.integrator, context, waves.lanes, waves.threads, waves.wave_size);
+  PassRunner runner(*integrator, waves.threads, waves.wave_size);
   for (const uint32_t seed : kPilotSeeds) {
     settings.seed = seed;
-    TrainingSamples training_samples;
-    const TrainingPlan lesson_plan{0, samples, 0, plan.grid, {}, nullptr, {}, 1};
-    pilot.cost +=
-        trace_training_paths(context, waves, pixels, lesson_plan, training_samples, stopped);
+    runner.run(pass, stopped);
     if (stopped()) return pilot;
-    const double sign = (seed == kPilotSeeds[0] ? 1.0 : -1.0) / samples;
-    for (size_t i = 0; i < pixels.size(); ++i)
-      for (uint32_t s = 0; s < samples; ++s)
-        pilot.differences[i] += sign * double{training_samples.luminances[i * samples + s]};
+    for (size_t i = 0; i < pass.pixels.size(); ++i)
+      pilot.differences[i] += seed == kPilotSeeds[0] ? reader.mean(i) : -reader.mean(i);
   }
+  pilot.cost = cost_of(*integrator, waves, context.accel->has_list(), context.guide != nullptr);
   return pilot;
 }
 

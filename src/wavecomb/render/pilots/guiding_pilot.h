@@ -41,6 +41,8 @@ struct PilotRender {
   std::vector<double> differences;  ///< difference of the two means of each pixel
   double cost = 0;                  ///< cost of both images, in rays traced through a BVH
 
+  /// Appends the pixels of a pilot render with the same number of samples.
+  void append(const PilotRender& other);
   double cost_of_sample() const {
     return cost / (2.0 * samples * static_cast<double>(differences.size()));
   }
@@ -51,16 +53,15 @@ struct PilotRenderPlan {
   std::span<const uint32_t> pixels;
   uint32_t samples;          ///< samples per pixel, in each of two images
   const GuidingView* guide;  ///< guiding field to use, or null for none
-  const GuidingGrid& grid;   ///< grid of the guiding field
 };
 
 /// Renders the pixels twice, with `settings` except for the seed.
 PilotRender render_pilot(WaveContext context, Settings settings, const WaveSetup& waves,
                          const PilotRenderPlan& plan, const std::function<bool()>& stopped);
 
-/// Returns the mean squared difference of the two images, relative to the brightness of the image.
-/// Leaves out the pixels that differ most, since fireflies say little about other pixels. Contract:
-/// `tiles` are lit.
+/// Returns the mean squared difference of the two images of `pixels`, relative to the brightness of
+/// the image. Leaves out the pixels that differ most, since fireflies say little about other
+/// pixels. Contract: `tiles` are lit.
 double error_of(const PilotRender& pilot, std::span<const uint32_t> pixels,
                 const ImageTiles& tiles);
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include "wavecomb/core/clock.h"
@@ -42,6 +43,10 @@ constexpr double kRecordingCost = 1.5;
 /// misleading.
 constexpr uint64_t kPilotShare = 320, kMinPilotPaths = 2048, kMaxPilotPaths = 65'536;
 constexpr uint32_t kMinPilotSamples = 16, kMaxPilotSamples = 32;
+/// After the first round, the pilot render begins with one of every kFirstPixels pixels. If the
+/// gain there is below kHopelessGain, the other pixels are not rendered.
+constexpr size_t kFirstPixels = 4;
+constexpr double kHopelessGain = 0.7;
 /// Samples per pixel from which the variance is estimated for learned roulette.
 constexpr uint32_t kSpreadSamples = 16;
 /// Learned roulette takes one variance sample for every kSpreadShare training paths.
@@ -120,9 +125,7 @@ class Trainer {
         grid_(grid_of(scene)),
         order_(morton_pixel_order({0, 0, settings_.width, settings_.height})),
         pilot_samples_(std::clamp(settings_.spp, kMinPilotSamples, kMaxPilotSamples)),
-        pilot_pixels_(subset_of_pixels(
-            order_,
-            std::clamp(samples_ / kPilotShare, kMinPilotPaths, kMaxPilotPaths) / pilot_samples_)),
+        pilot_pixels_(pixels_of_pilot()),
         field_(std::make_shared<const GuidingField>(grid_)) {
     settings_.seed = 0x2545f491u;
     // Disable roulette: it multiplies the contribution of survivors, and the added noise would hide
@@ -162,13 +165,13 @@ class Trainer {
   /// Trains for Guiding::kAuto. After each of the first two rounds, a pilot render decides whether
   /// to continue.
   GuidingTraining train_if_it_pays() {
-    const PilotRender without = pilot(nullptr);
+    PilotRender without = pilot(first_pixels(), nullptr);
     for (uint32_t round = 0; round < kMinGains.size(); ++round) {
       const uint64_t most = round == 0 ? kMaxFirstPaths : kMaxSecondPaths;
       const double cost = run(round, std::min(samples_ / kAutoShares[round], most));
       if (ended()) return result(false);
       if (round == 0) measure_speed(cost, without);
-      if (measure_gain(without) < kMinGains[round] || ended()) return result(false);
+      if (!pays(round, without)) return result(false);
     }
     // The render will be guided, so more training is worthwhile: it improves the guiding field.
     if (is_timed()) max_s_ = double{settings_.time_limit} / kMaxGuidedTimeShare;
@@ -193,11 +196,28 @@ class Trainer {
     return out;
   }
 
-  PilotRender pilot(const GuidingView* guide) const {
-    return render_pilot(
-        context_, pilot_settings_, waves_,
-        {.pixels = pilot_pixels_, .samples = pilot_samples_, .guide = guide, .grid = grid_},
-        [this] { return ended(); });
+  /// Returns the pixels of the pilot renders, those of the first part in front.
+  std::vector<uint32_t> pixels_of_pilot() const {
+    const uint64_t paths = std::clamp(samples_ / kPilotShare, kMinPilotPaths, kMaxPilotPaths);
+    const std::vector<uint32_t> all = subset_of_pixels(order_, paths / pilot_samples_);
+    std::vector<uint32_t> pixels, others;
+    for (size_t i = 0; i < all.size(); ++i)
+      (i % kFirstPixels == 0 ? pixels : others).push_back(all[i]);
+    pixels.insert(pixels.end(), others.begin(), others.end());
+    return pixels;
+  }
+  std::span<const uint32_t> first_pixels() const {
+    const std::span<const uint32_t> all = pilot_pixels_;
+    return all.first((all.size() + kFirstPixels - 1) / kFirstPixels);
+  }
+  std::span<const uint32_t> other_pixels() const {
+    return std::span<const uint32_t>(pilot_pixels_).subspan(first_pixels().size());
+  }
+
+  PilotRender pilot(std::span<const uint32_t> pixels, const GuidingView* guide) const {
+    return render_pilot(context_, pilot_settings_, waves_,
+                        {.pixels = pixels, .samples = pilot_samples_, .guide = guide},
+                        [this] { return ended(); });
   }
 
   GuidingView view() const {
@@ -206,16 +226,29 @@ class Trainer {
     return view;
   }
 
-  /// Returns the gain in efficiency of the current field, measured by a pilot render, or 0 if
-  /// unknown.
-  double measure_gain(const PilotRender& without) {
-    if (!tiles_->is_lit() || field_->facts().regions == 0) return 0;
+  /// Returns whether training pays after `round`, and measures the gain in efficiency of the
+  /// current field. `without` is a pilot render without guiding: of the first pixels in round 0,
+  /// which adds the other pixels if they are needed.
+  bool pays(uint32_t round, PilotRender& without) {
+    if (!tiles_->is_lit() || field_->facts().regions == 0) return false;
     const GuidingView guide = view();
-    const PilotRender with = pilot(&guide);
-    const double guided_cost = error_of(with, pilot_pixels_, *tiles_) * with.cost;
+    PilotRender with = pilot(first_pixels(), &guide);
+    if (round == 0) {
+      compare(with, without);
+      if (statistics_.gain < kHopelessGain || ended()) return false;
+      without.append(pilot(other_pixels(), nullptr));
+    }
+    with.append(pilot(other_pixels(), &guide));
+    compare(with, without);
+    return statistics_.gain >= kMinGains[round] && !ended();
+  }
+
+  /// Sets the gain in efficiency from two pilot renders of the same pixels.
+  void compare(const PilotRender& with, const PilotRender& without) {
+    const auto pixels = std::span<const uint32_t>(pilot_pixels_).first(with.differences.size());
+    const double guided_cost = error_of(with, pixels, *tiles_) * with.cost;
     if (guided_cost > 0 && !ended())
-      statistics_.gain = error_of(without, pilot_pixels_, *tiles_) * without.cost / guided_cost;
-    return statistics_.gain;
+      statistics_.gain = error_of(without, pixels, *tiles_) * without.cost / guided_cost;
   }
 
   /// Sets the number of training paths that cost as much as the image. `cost` is the cost of the
@@ -278,10 +311,10 @@ class Trainer {
     GuidingView trained = field.view();
     tiles_->apply(trained);
     const auto subset = subset_of_pixels(order_, budget_ / kSpreadShare / (2 * kSpreadSamples));
-    const PilotRender pilot = render_pilot(
-        context_, settings_, waves_,
-        {.pixels = subset, .samples = kSpreadSamples, .guide = &trained, .grid = grid_},
-        [this] { return ended(); });
+    const PilotRender pilot =
+        render_pilot(context_, settings_, waves_,
+                     {.pixels = subset, .samples = kSpreadSamples, .guide = &trained},
+                     [this] { return ended(); });
     return 0.5 * kSpreadSamples * error_of(pilot, subset, *tiles_);
   }
 
