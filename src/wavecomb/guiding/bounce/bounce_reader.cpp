@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 #include "wavecomb/guiding/lookup.h"
 #include "wavecomb/guiding/path_moments.h"
@@ -109,6 +110,11 @@ void BounceReader::append_to(TrainingSamples& training_samples) const {
     const auto from = own.begin() + static_cast<std::ptrdiff_t>(path * kVertices);
     all.insert(all.end(), from, from + count);
   };
+  const auto total = [](const std::vector<uint8_t>& counts) {
+    return std::accumulate(counts.begin(), counts.end(), size_t{0});
+  };
+  training_samples.records.reserve(training_samples.records.size() + total(record_counts_));
+  training_samples.bounces.reserve(training_samples.bounces.size() + total(bounce_counts_));
   for (size_t path = 0; path < paths_.size(); ++path) {
     append(training_samples.records, records_, path, record_counts_[path]);
     append(training_samples.bounces, bounces_, path, bounce_counts_[path]);

@@ -46,7 +46,7 @@ constexpr uint32_t kMinPilotSamples = 16, kMaxPilotSamples = 32;
 /// After the first round, the pilot render begins with one of every kFirstPixels pixels. If the
 /// gain there is below kHopelessGain, the other pixels are not rendered.
 constexpr size_t kFirstPixels = 4;
-constexpr double kHopelessGain = 0.7;
+constexpr double kHopelessGain = 0.8;
 /// Samples per pixel from which the variance is estimated for learned roulette.
 constexpr uint32_t kSpreadSamples = 16;
 /// Learned roulette takes one variance sample for every kSpreadShare training paths.
