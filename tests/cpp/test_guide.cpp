@@ -10,6 +10,7 @@
 #include "wavecomb/guiding/region_directions.h"
 #include "wavecomb/guiding/roulette.h"
 #include "wavecomb/guiding/sampling_table.h"
+#include "wavecomb/scene/parallel.h"
 
 namespace wavecomb {
 namespace {
@@ -42,6 +43,27 @@ std::vector<TrainingRecord> many_bounces(uint32_t count, uint32_t seed) {
                              0.5f + random()));
   }
   return records;
+}
+
+TEST(Guide, FieldIsTheSameOnAnyNumberOfThreads) {
+  const std::vector<TrainingRecord> records = many_bounces(40000, 11);
+  for (const bool first : {true, false}) {
+    std::vector<GuidingFieldArrays> built;
+    for (const uint32_t threads : {1u, 3u})
+      with_threads(threads, [&] {
+        built.push_back(GuidingField(kUnitGrid, records, 1, first, true, SIZE_MAX).parts());
+      });
+    ASSERT_GT(built[0].bsdf_share.size(), 50u);
+    EXPECT_EQ(built[0].entries, built[1].entries);
+    EXPECT_EQ(built[0].cells, built[1].cells);
+    EXPECT_EQ(built[0].tables, built[1].tables);
+    EXPECT_EQ(built[0].bsdf_share, built[1].bsdf_share);
+    for (size_t i = 0; i < built[0].spheres.size(); ++i) {
+      EXPECT_EQ(built[0].spheres[i].inverse_distance, built[1].spheres[i].inverse_distance);
+      for (int axis = 0; axis < 3; ++axis)
+        EXPECT_EQ(built[0].spheres[i].centre[axis], built[1].spheres[i].centre[axis]);
+    }
+  }
 }
 
 TEST(Guide, OctahedralMapKeepsAreas) {

@@ -21,7 +21,7 @@ constexpr uint32_t kAimRounds = 4, kAimSeed = 0x9e3779b9u;
 constexpr uint32_t kVisibleCells = 48;
 /// A training round traces one light path for every `kAimShare` pixels of the image, but at least
 /// `kMinAimPaths` and at most `kMaxAimPaths` light paths.
-constexpr uint64_t kAimShare = 4, kMinAimPaths = 4096, kMaxAimPaths = 131'072;
+constexpr uint64_t kAimShare = 4, kMinAimPaths = 8192, kMaxAimPaths = 131'072;
 
 /// Returns spheres around the points that the camera sees. The radii are doubled, to include
 /// objects that reflect or focus light onto these points.
