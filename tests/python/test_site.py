@@ -126,12 +126,8 @@ PARTS = {
     "limits": r"^## Limits",
 }
 """Parts of a page other than its first sentence, as patterns."""
-WITHOUT = {"faq": {"limits"}, "glossary": {"limits"}, "ide": {"image"},
-           "window-compare": {"image"}, "window-scene": {"image"},
-           "window-scheduling": {"image"}}  # fmt: skip
-"""Page parts that pages may omit. docs/decisions/page-parts.md has the reasons, except for pages
-about the window, which have no images yet.
-"""
+WITHOUT = {"faq": {"limits"}, "glossary": {"limits"}, "ide": {"image"}}
+"""Page parts that pages may omit. docs/decisions/page-parts.md has the reasons."""
 
 
 @pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=lambda page: page.stem)
