@@ -58,6 +58,10 @@ build/.setup: tools/setup tools/wheels tools/setup_embree tools/setup_openvdb to
 build/.setup-test: build/.setup
 	@$(SETUP_LOCK) tools/setup test && touch $@
 
+# Install Doxygen for the C++ reference, which only make docs needs.
+build/.setup-docs: build/.setup
+	@$(SETUP_LOCK) tools/setup docs && touch $@
+
 .PHONY: lanes
 lanes:
 build/.lanes: lanes
@@ -120,10 +124,10 @@ render: build ## Render the Mixed scene to out/mixed.exr and out/mixed.png
 	$(VENV)/wavecomb render out/mixed.usdc -o out/mixed.exr --png out/mixed.png --size 800 500 $$($(denoiser) && echo --denoise)
 
 # make test does not build the documentation site, since MkDocs is an optional dependency.
-docs: build ## Build the documentation site in out/site
+docs: build build/.setup-docs ## Build the documentation site in out/site
 	@$(VENV)/python -c 'import material' 2> /dev/null || $(VENV)/python -m pip install -q -c constraints.txt 'mkdocs-material>=9.5'
 	NO_MKDOCS_2_WARNING=1 $(VENV)/python -m mkdocs build --strict --quiet
-	@command -v doxygen > /dev/null || echo "docs: without the C++ reference; apt install doxygen adds it"
+	@command -v doxygen > /dev/null || echo "docs: without the C++ reference, since Doxygen is missing; install it with your package manager"
 	@echo "wrote out/site/index.html"
 
 # ---- tests -------------------------------------------------------------------------------------

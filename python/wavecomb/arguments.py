@@ -104,6 +104,25 @@ def check_arguments(size: Any, spp: Any, aovs: Any, options: Mapping[str, Any]) 
         if not isinstance(value, kind) or (kind is not bool and isinstance(value, bool)):
             default = row.default if row.default is not None else 1
             raise _wrong(name, value, what, f"{name}={default!r}")
+        _check_range(name, value)
+
+
+def _check_range(name: str, value: Any) -> None:
+    """Raises ArgumentError if a number is outside the range in the settings table."""
+    from wavecomb.options import settings
+
+    row = settings()[name]
+    if row.kind not in ("integer", "number") or (value == 0 and row.zero):
+        return
+    if row.least is None or row.most is None:
+        return
+    # The table rounds numbers above 2^24, of which integers have only the limit 2^32 - 1.
+    most = 2**32 - 1 if row.kind == "integer" and row.most > 2**24 else row.most
+    if row.least <= value <= most:
+        return
+    limits = f"from {row.least:.12g} to {most:.12g}"
+    example = _EXAMPLES.get(name, f"{name}={row.default if row.default is not None else 1!r}")
+    raise _wrong(name, value, limits, example)
 
 
 def _is_pair(size: Any) -> bool:

@@ -238,7 +238,11 @@ def test_work_after_the_render_is_named() -> None:
         ({"spp": 1.5}, "spp=1.5: must be a whole number"),
         ({"max_depth": "8"}, "max_depth='8': must be a whole number, such as max_depth=8"),
         ({"spp": 0}, "0 samples per pixel"),
-        ({"max_depth": -1}, "max_depth"),
+        ({"max_depth": -1}, "max_depth=-1: must be from 0 to 4096, such as max_depth=8"),
+        ({"max_depth": 4097}, "max_depth=4097: must be from 0 to 4096, such as max_depth=8"),
+        ({"seed": 2**32}, "seed=4294967296: must be from 0 to 4294967295, such as seed=0"),
+        ({"noise": 1.5}, "noise=1.5: must be from 0 to 1, such as noise="),
+        ({"wave_size": 8}, "wave_size=8: must be from 64 to 1048576, such as wave_size="),
     ],
 )
 @REAL
