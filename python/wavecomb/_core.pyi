@@ -722,6 +722,9 @@ class Settings:
     """Whether paths start at the camera only or also at the lights. Default: auto."""
     light_aim: Literal["off", "on"]
     """How the starting points and directions of light paths are chosen. Default: on."""
+    light_splats: Literal["auto", "filtered", "pixel"]
+    """How light paths contribute to pixels around the point where the camera sees them. Default:
+    auto."""
     merge_radius: float
     """Radius in pixels within which light paths merge at points seen in mirrors or through glass,
     which blurs these caustics. Default: never. 0: never."""

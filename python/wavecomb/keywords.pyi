@@ -65,6 +65,7 @@ class SettingKeywords(TypedDict, total=False):
     quality: Literal["auto", "plain"]
     transport: Literal["path", "light", "auto", "bdpt"]
     light_aim: Literal["off", "on"]
+    light_splats: Literal["auto", "filtered", "pixel"]
     merge_radius: float
     firefly: Literal["keep", "reweight"]
     roulette_depth: int

@@ -237,7 +237,7 @@ TEST(CameraConnections, GoRoundAPictureOfAllDirections) {
     ASSERT_TRUE(filter.reaches<float>(c.x, c.y));
     double sum = 0;
     std::vector<double> weight(kAcross * kDown);
-    filter.spread(film, c.x, c.y, [&](size_t pixel, float w) {
+    filter.spread(film, {c.x, c.y, 0}, [&](size_t pixel, float w) {
       weight[pixel] += double{w};
       sum += double{w};
     });
@@ -258,6 +258,45 @@ TEST(CameraConnections, GoRoundAPictureOfAllDirections) {
   const auto behind = connect_to_camera<float>(front, front.to_world.t + Vec3<float>{0.1f, 0, 1},
                                                0.f, 0.f, 0.f, true);
   EXPECT_FALSE(half.reaches<float>(behind.x, behind.y));
+}
+
+// In one-pixel mode, a splat has the same expected weight in each pixel as in filtered mode,
+// whatever the region.
+TEST(CameraConnections, OnePixelHasTheWeightsOfTheFilterOnAverage) {
+  constexpr uint32_t kSide = 8;
+  const FilterTable table(FilterKind::kBlackmanHarris, 3);
+  const Region all{0, 0, kSide, kSide}, part{3, 2, 6, 8};
+  const LightSplatFilter spread(table, all), one(table, all, {}, true),
+      one_of_part(table, part, {}, true);
+  const Film film(all, {}, false);
+  Random random(9);
+  for (int i = 0; i < 20; ++i) {
+    const float x = 8 * random(), y = 8 * random();
+    std::vector<double> expected(kSide * kSide), mean(kSide * kSide);
+    spread.spread(film, {x, y, 0}, [&](size_t pixel, float w) { expected[pixel] += double{w}; });
+    constexpr int kDraws = 20000;
+    for (int n = 0; n < kDraws; ++n) {
+      const LightSplatPoint at{x, y, random.bits()};
+      size_t chosen = kSide * kSide, chosen_in_part = kSide * kSide;
+      one.spread(film, at, [&](size_t pixel, float w) {
+        EXPECT_EQ(chosen, size_t{kSide} * kSide) << "one pixel at most";
+        chosen = pixel;
+        mean[pixel] += double{w} / kDraws;
+      });
+      one_of_part.spread(film, at, [&](size_t pixel, float) { chosen_in_part = pixel; });
+      const auto column = static_cast<uint32_t>(chosen % kSide);
+      const auto row = static_cast<uint32_t>(chosen / kSide);
+      if (chosen < size_t{kSide} * kSide && part.contains(column, row))
+        EXPECT_EQ(chosen_in_part, chosen);
+      else
+        EXPECT_EQ(chosen_in_part, size_t{kSide} * kSide);
+    }
+    // Six standard deviations of 20 x 64 binomial means.
+    for (size_t pixel = 0; pixel < mean.size(); ++pixel)
+      EXPECT_NEAR(mean[pixel], expected[pixel],
+                  6 * std::sqrt(std::max(expected[pixel], 1e-4) / kDraws))
+          << x << " " << y;
+  }
 }
 
 }  // namespace

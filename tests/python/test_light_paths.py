@@ -39,6 +39,55 @@ def render(stage: Any, **settings: Any) -> wavecomb.Picture:
     return wavecomb.render(stage, **(plain | settings))
 
 
+@pytest.mark.parametrize(("name", "projection"), [("caustics", None), ("pool", "latlong")])
+def test_splats_of_one_pixel_do_not_depend_on_the_schedule(
+    stages: Any, name: str, projection: Any
+) -> None:
+    stage = wavecomb.load(stages(name), projection=projection)
+    layers = ("direct", "indirect", "emission", "techniques")
+    plain = render(stage, light_splats="pixel", aovs=layers)
+    assert not np.array_equal(plain.beauty, render(stage, light_splats="filtered").beauty)
+    ways: list[dict[str, Any]] = [
+        {"threads": 1, "wave_size": 64, "policy": "random-runs"},
+        {"integrator": "reference"},
+    ]
+    for way in ways:
+        other = render(stage, light_splats="pixel", aovs=layers, **way)
+        assert np.array_equal(plain.beauty, other.beauty), way
+        assert all(np.array_equal(plain.aovs[k], other.aovs[k]) for k in plain.aovs), way
+    x0, y0, x1, y1 = region = (7, 9, 23, 29)
+    part = render(stage, light_splats="pixel", region=region, crop=True)
+    assert np.array_equal(part.beauty, plain.beauty[y0:y1, x0:x1])
+    parts = sum(plain.aovs[k].astype(np.float64) for k in ("direct", "indirect", "emission"))
+    assert np.allclose(parts, plain.beauty, rtol=1e-4, atol=1e-5)
+
+
+def test_splats_go_to_one_pixel_where_a_denoiser_follows(stages: Any) -> None:
+    stage = wavecomb.load(stages("caustics"))
+    guides = ("guide_albedo", "guide_normal")
+    filtered, pixel = (render(stage, light_splats=way).beauty for way in ("filtered", "pixel"))
+    assert np.array_equal(render(stage).beauty, filtered)
+    assert np.array_equal(render(stage, aovs=guides).beauty, pixel)
+    assert np.array_equal(render(stage, aovs=guides, light_splats="filtered").beauty, filtered)
+
+
+def test_a_denoiser_removes_the_noise_of_light_paths(stages: Any) -> None:
+    """Noise that is equal in neighbouring pixels would remain as grain."""
+    pytest.importorskip("pyoidn")
+    stage = wavecomb.load(stages("lens"))
+    grain = {}
+    for way in ("filtered", "pixel"):
+        picture = render(
+            stage, size=(128, 128), spp=4, light_splats=way, aovs=("guide_albedo", "guide_normal")
+        )
+        image = np.log(picture.with_denoised().denoised.mean(axis=2) + 1e-3)
+        # The median ignores edges.
+        grain[way] = np.median(np.abs(image[1:-1, 1:-1] - 0.25 * (
+            image[:-2, 1:-1] + image[2:, 1:-1] + image[1:-1, :-2] + image[1:-1, 2:]
+        )))  # fmt: skip
+    assert grain["pixel"] < 0.5 * grain["filtered"]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "projection"), [("caustics", None), ("mixed", None), ("pool", "latlong")]

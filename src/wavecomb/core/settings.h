@@ -58,6 +58,12 @@ enum class Traversal : uint8_t { kPackets, kSingle };
 /// bounces read one random texel (docs/decisions/one-texel.md). With `kWhole`, all hits use full
 /// filtering.
 enum class TextureFilter : uint8_t { kAuto, kWhole };
+/// Distribution of light splats over pixels. With `kFiltered`, a light splat contributes to all
+/// pixels around it, with the weights of the pixel filter. With `kPixel`, it contributes to one of
+/// them, chosen at random with these weights: there is more noise, but the noise of different
+/// pixels is independent, which denoisers expect. `kAuto` means `kPixel` if the render stores the
+/// denoiser's guides, else `kFiltered`.
+enum class LightSplats : uint8_t { kAuto, kFiltered, kPixel };
 /// Distribution of a render's samples over pixels (render/passes/allotment.h).
 enum class Allocate : uint8_t { kEven, kError, kEfficiency };
 /// Path guiding, with a guiding field that is trained before the first pass
@@ -120,11 +126,12 @@ struct Settings {
   /// Whether light paths are aimed at regions where light paths of a training render before the
   /// first pass contributed to the image (light_paths/render/light_aiming.h).
   bool light_aim = true;
+  LightSplats light_splats = LightSplats::kAuto;
   /// Merge radius in pixels, within which light paths end at points that the camera sees by
   /// specular reflection or refraction (light_paths/merge_grid.h). 0 means no merging.
   float merge_radius = 0;
   Firefly firefly = Firefly::kKeep;
-  /// AOVs to store; the beauty does not depend on them.
+  /// AOVs to store; the beauty does not depend on them, except by LightSplats::kAuto.
   AovSet aovs;
   /// Names of the light groups that `Aov::kLightGroups` stores. An empty list means all light
   /// groups.
@@ -184,6 +191,10 @@ struct Settings {
   /// Returns whether light paths are merged with points that the camera sees by specular reflection
   /// or refraction.
   bool merges() const { return transport == Transport::kLight && merge_radius > 0; }
+  bool splats_to_one_pixel() const {
+    return light_splats == LightSplats::kPixel ||
+           (light_splats == LightSplats::kAuto && aovs.has(AovSource::kGuide));
+  }
   bool is_adaptive() const { return adaptive > 0 || noise > 0; }
   /// Returns the pixels that are rendered.
   Region rendered() const { return region.value_or(Region{0, 0, width, height}); }

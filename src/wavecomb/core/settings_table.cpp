@@ -188,9 +188,7 @@ std::vector<SettingInfo> work_settings() {
   return {
       choice<&S::roulette>(
           "roulette", "Roulette",
-          {{"auto",
-            "Roulette runs in mode efficient with path guiding, and in mode throughput without "
-            "it."},
+          {{"auto", "Roulette runs in mode efficient with path guiding, else in mode throughput."},
            {"off", "Roulette is off, so it terminates no path before the maximum depth."},
            {"throughput", "The survival probability of a path grows with its throughput."},
            {"cost-aware",
@@ -203,27 +201,30 @@ std::vector<SettingInfo> work_settings() {
           "quality", "Quality",
           {{"auto",
             "Path guiding and light paths are used where short pilot renders predict a gain."},
-           {"plain",
-            "There are no pilot renders; mode auto of guiding and transport means no guiding and "
-            "no light paths."}},
+           {"plain", "Mode auto of guiding and transport means no guiding and no light paths."}},
           "Whether short pilot renders decide about path guiding and light paths."),
-      choice<&S::transport>("transport", "Transport",
-                            {{"path", "Paths start at the camera only."},
-                             {"light",
-                              "Paths start at the camera and at the lights, combined by multiple "
-                              "importance sampling, for caustics of small lights."},
-                             {"auto",
-                              "Paths also start at the lights if a short pilot render predicts "
-                              "that this reduces noise."},
-                             {"bdpt",
-                              "Bidirectional path tracing connects vertices of camera and light "
-                              "paths, so far without a measured benefit over mode light."}},
-                            "Whether paths start at the camera only or also at the lights."),
+      choice<&S::transport>(
+          "transport", "Transport",
+          {{"path", "Paths start at the camera only."},
+           {"light",
+            "Paths start at the camera and at the lights, combined by multiple "
+            "importance sampling, for caustics of small lights."},
+           {"auto", "As mode light if a pilot render predicts a gain, else as mode path."},
+           {"bdpt",
+            "Vertices of camera and light paths are also connected, so far "
+            "without a benefit."}},
+          "Whether paths start at the camera only or also at the lights."),
       choice<&S::light_aim>(
           "light_aim", "Light path aiming",
           {{"off", "Light paths start according to the emission of the lights alone."},
            {"on", "Light paths mostly start where earlier pilot paths contributed to the image."}},
           "How the starting points and directions of light paths are chosen."),
+      choice<&S::light_splats>(
+          "light_splats", "Light splats",
+          {{"auto", "Mode pixel in renders that are denoised, else mode filtered."},
+           {"filtered", "To all pixels around, with the weights of the pixel filter."},
+           {"pixel", "To one of them at random, since denoisers need independent noise."}},
+          "How light paths add light to the pixels around a point that the camera sees."),
       in_expectation(
           number<&S::merge_radius>("merge_radius", "Merge radius", 0, 64,
                                    "Radius in pixels within which light paths merge at points seen "

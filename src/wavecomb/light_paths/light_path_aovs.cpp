@@ -53,7 +53,7 @@ void LightPathAovs::add_to_film(Film& film, const LightSplatFilter& filter,
   if (layout_.first_group != LightSplatLayout::kNotStored &&
       tables_->film_group[splat.light] != kNoGroup)
     group = layout_.first_group + tables_->film_group[splat.light];
-  filter.spread(film, splat.x, splat.y, [&](size_t pixel, float weight) {
+  filter.spread(film, splat.at, [&](size_t pixel, float weight) {
     const auto add = [&](uint32_t sum_index, const Color<float>& v) {
       film.aovs().add_light_splat(pixel, sum_index, v.x * weight, v.y * weight, v.z * weight);
     };

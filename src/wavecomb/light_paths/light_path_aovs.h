@@ -61,7 +61,7 @@ struct LightSplat {
   uint32_t slot;   ///< slot of the light path
   uint32_t depth;  ///< depth of the vertex
   uint32_t light;  ///< light at which the path started
-  float x, y;      ///< position on the film in pixels
+  LightSplatPoint at;
   Color<float> c;
 };
 

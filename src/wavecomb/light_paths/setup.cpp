@@ -61,10 +61,11 @@ LightPathConflict light_path_conflict(const Scene& scene) {
 }
 
 LightSplatFilter make_light_splat_filter(const CameraSetup& camera, const FilterTable& filter,
-                                         const Region& rendered) {
-  if (camera.projection != Projection::kLatlong) return {filter, rendered};
+                                         const Region& rendered, bool one_pixel) {
+  if (camera.projection != Projection::kLatlong) return {filter, rendered, {}, one_pixel};
   const auto row = [&](float latitude) { return (camera.y1 - latitude) / camera.step_y; };
-  return {filter, rendered, {2 * kPi / camera.step_x, row(0.5f * kPi), row(-0.5f * kPi)}};
+  return {
+      filter, rendered, {2 * kPi / camera.step_x, row(0.5f * kPi), row(-0.5f * kPi)}, one_pixel};
 }
 
 void check_light_paths(const Scene& scene, const Settings& settings) {

@@ -43,8 +43,9 @@ float scene_brightness(const Scene& scene);
 FixedPoint light_splat_unit(const Scene& scene);
 
 /// Returns the filter that distributes contributions of light paths to the pixels of a render.
+/// `one_pixel` is Settings::splats_to_one_pixel().
 LightSplatFilter make_light_splat_filter(const CameraSetup& camera, const FilterTable& filter,
-                                         const Region& rendered);
+                                         const Region& rendered, bool one_pixel = false);
 
 /// Enables light paths for the lights of `view`: sets the bounding sphere of all surfaces, and the
 /// distance from its centre at which light paths of infinite lights start, in front of all light

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "wavecomb/core/encoding/hash.h"
 #include "wavecomb/core/lanes/arithmetic.h"
 #include "wavecomb/film/film.h"
 #include "wavecomb/film/filter.h"
@@ -19,16 +20,26 @@ struct ImageWrap {
   float north = 0, south = 0;  ///< y coordinates of the poles in pixels
 };
 
-/// Distributes light splats over pixels with the pixel filter. The position (x, y) of a splat is in
-/// pixels from the upper left corner of the image. The splat's weight in a pixel is the density of
-/// the filter at its offset from the pixel centre, which is also the density with which filter
-/// importance sampling chooses the positions of the pixel's camera rays.
+/// Position (x, y) of a light splat, in pixels from the upper left corner of the image, and random
+/// bits of its path vertex.
+struct LightSplatPoint {
+  float x, y;
+  uint32_t bits;
+};
+
+/// Distributes light splats over pixels with the pixel filter. The splat's weight in a pixel is the
+/// density of the filter at its offset from the pixel centre, which is also the density with which
+/// filter importance sampling chooses the positions of the pixel's camera rays. In mode
+/// `one_pixel`, a splat has the sum of its weights in one pixel, which is chosen with a probability
+/// proportional to its weight, and no weight elsewhere. The choice does not depend on the rendered
+/// region.
 class LightSplatFilter {
  public:
   /// Creates a filter for light splats. `rendered` is the rectangle of pixels that receive light
   /// splats.
-  LightSplatFilter(const FilterTable& filter, const Region& rendered, const ImageWrap& turn = {})
-      : filter_(filter), rendered_(rendered), turn_(turn) {}
+  LightSplatFilter(const FilterTable& filter, const Region& rendered, const ImageWrap& turn = {},
+                   bool one_pixel = false)
+      : filter_(filter), rendered_(rendered), turn_(turn), one_pixel_(one_pixel) {}
 
   /// Returns whether a splat at (x, y) contributes to any pixel.
   template <typename F>
@@ -41,18 +52,18 @@ class LightSplatFilter {
             wraps_into_image<F>(half));
   }
 
-  /// Calls `add(pixel, weight)` for each pixel to which a splat at (x, y) contributes. `pixel` is
-  /// the result of `Film::index`.
+  /// Calls `add(pixel, weight)` for each pixel to which a splat contributes. `pixel` is the result
+  /// of `Film::index`.
   template <typename Add>
-  void spread(const Film& film, float x, float y, const Add& add) const {
+  void spread(const Film& film, const LightSplatPoint& at, const Add& add) const {
     if (turn_.pixels == 0) [[likely]] {
-      spread_at(film, x, y, add);
+      spread_at(film, at, add);
       return;
     }
-    const float half = x + 0.5f * turn_.pixels;
-    spread_around(film, x, y, add);
-    spread_around(film, half, 2 * turn_.north - y, add);
-    spread_around(film, half, 2 * turn_.south - y, add);
+    const float half = at.x + 0.5f * turn_.pixels;
+    spread_around(film, at, add);
+    spread_around(film, {half, 2 * turn_.north - at.y, at.bits}, add);
+    spread_around(film, {half, 2 * turn_.south - at.y, at.bits}, add);
   }
 
  private:
@@ -79,14 +90,55 @@ class LightSplatFilter {
   }
 
   template <typename Add>
-  void spread_around(const Film& film, float x, float y, const Add& add) const {
-    if (!contains_row<float>(y)) return;
-    for (float at = after_left<float>(x); at < right(); at += turn_.pixels)
-      spread_at(film, at, y, add);
+  void spread_around(const Film& film, const LightSplatPoint& at, const Add& add) const {
+    if (!contains_row<float>(at.y)) return;
+    for (float x = after_left<float>(at.x); x < right(); x += turn_.pixels)
+      spread_at(film, {x, at.y, at.bits}, add);
+  }
+
+  /// Pixel column or row, and the sum of the weights of all columns or rows.
+  struct Chosen {
+    int index;
+    float weight;
+  };
+  /// Chooses a column or row for a splat at `at`, with a probability proportional to its weight.
+  /// `u` is uniform in [0, 1).
+  Chosen choose(float at, float u) const {
+    const float r = filter_.radius();
+    const int first = static_cast<int>(std::floor(at - r - 0.5f));
+    const int last = static_cast<int>(std::ceil(at + r - 0.5f));
+    const auto weight = [&](int i) {
+      return std::max(0.f, filter_.density(at - (static_cast<float>(i) + 0.5f)));
+    };
+    float sum = 0;
+    for (int i = first; i <= last; ++i) sum += weight(i);
+    Chosen chosen{first, sum};
+    float left = u * sum;
+    for (int i = first; i <= last; ++i) {
+      const float w = weight(i);
+      if (!(w > 0)) continue;
+      chosen.index = i;
+      if (left < w) break;
+      left -= w;
+    }
+    return chosen;
+  }
+  template <typename Add>
+  void add_to_one(const Film& film, const LightSplatPoint& at, const Add& add) const {
+    const Chosen x = choose(at.x, unit_float<float>(hash_u32<uint32_t>(at.bits ^ 0x68bc21ebu)));
+    const Chosen y = choose(at.y, unit_float<float>(hash_u32<uint32_t>(at.bits ^ 0x02e5be93u)));
+    if (x.index < 0 || y.index < 0 || !(x.weight * y.weight > 0)) return;
+    const auto column = static_cast<uint32_t>(x.index), row = static_cast<uint32_t>(y.index);
+    if (rendered_.contains(column, row)) add(film.index(column, row), x.weight * y.weight);
   }
 
   template <typename Add>
-  void spread_at(const Film& film, float x, float y, const Add& add) const {
+  void spread_at(const Film& film, const LightSplatPoint& point, const Add& add) const {
+    if (one_pixel_) {
+      add_to_one(film, point, add);
+      return;
+    }
+    const auto [x, y, bits] = point;
     const float r = filter_.radius();
     // Pixels i with |x - (i + 1/2)| < r.
     const auto first = [&](float at, uint32_t edge) {
@@ -109,6 +161,7 @@ class LightSplatFilter {
   const FilterTable& filter_;
   Region rendered_;
   ImageWrap turn_;
+  bool one_pixel_;
 };
 
 }  // namespace wavecomb

@@ -67,7 +67,7 @@ class LightTracer {
       if (v.has_shadow) {
         clock_.enter(Phase::kShadow);
         if (!rays_.occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth, nullptr))
-          add_contribution(pixel, sample, depth, light.light, out);
+          add_contribution(pixel, sample, {depth, light_path_row<F>(path, light, start.key)}, out);
       }
       if (!v.alive) return;
       path = v.next;
@@ -76,29 +76,29 @@ class LightTracer {
   }
 
  private:
-  void add_contribution(uint32_t pixel, uint32_t sample, uint32_t depth, uint32_t light,
-                        const LightVertexResult<F>& out) {
-    if (context_.joint.aim_samples) {
-      context_.joint.aim_samples->add(light_path_number(*context_.settings, pixel), depth,
-                                      out.v.direct);
-      return;
-    }
-    add_light_splat(context_, buffers_.splats, sample, out.x, out.y, out.v.direct);
-    if (buffers_.aovs)
-      buffers_.aovs.add_to_film(*context_.film, *context_.joint.filter,
-                                {.slot = kOnlySlot,
-                                 .depth = depth,
-                                 .light = light,
-                                 .x = out.x,
-                                 .y = out.y,
-                                 .c = out.v.direct});
-  }
-
   /// State of a light path that arrives at its vertex number `depth`.
   struct Arrival {
     uint32_t depth;
     LightPathRow<F> path;
   };
+
+  void add_contribution(uint32_t pixel, uint32_t sample, const Arrival& at,
+                        const LightVertexResult<F>& out) {
+    if (context_.joint.aim_samples) {
+      context_.joint.aim_samples->add(light_path_number(*context_.settings, pixel), at.depth,
+                                      out.v.direct);
+      return;
+    }
+    const LightSplatPoint point = light_splat_point(at.path.key, at.depth, out.x, out.y);
+    add_light_splat(context_, buffers_.splats, sample, point, out.v.direct);
+    if (buffers_.aovs)
+      buffers_.aovs.add_to_film(*context_.film, *context_.joint.filter,
+                                {.slot = kOnlySlot,
+                                 .depth = at.depth,
+                                 .light = at.path.light,
+                                 .at = point,
+                                 .c = out.v.direct});
+  }
 
   void store_vertex(const Arrival& at, const SingleHit& hit, uint32_t mesh, uint32_t material,
                     const LightVertexResult<F>& out) {

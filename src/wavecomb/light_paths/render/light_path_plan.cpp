@@ -15,7 +15,8 @@ LightPathPlan::LightPathPlan(const Scene& scene, const Settings& settings, Light
     : scene_(scene),
       settings_(settings),
       share_(share),
-      filter_(make_light_splat_filter(camera, filter, settings.rendered())) {
+      filter_(make_light_splat_filter(camera, filter, settings.rendered(),
+                                      settings.splats_to_one_pixel())) {
   if (!settings.joins_light()) return;
   check_light_paths(scene, settings);
   lights_without_paths_ = wavecomb::lights_without_paths(scene);

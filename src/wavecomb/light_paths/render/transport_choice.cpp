@@ -54,6 +54,30 @@ std::array<uint32_t, 2> pilot_size(const Settings& s, uint64_t samples) {
   return {side(s.width), side(s.height)};
 }
 
+/// Returns the settings of the pilot renders, which trace light paths and ignore what the image
+/// stores.
+Settings pilot_settings(const Settings& settings, uint32_t width, uint32_t height) {
+  Settings small = settings;
+  small.width = width;
+  small.height = height;
+  small.spp = kTransportSamples;
+  small.region.reset();
+  small.crop = false;
+  small.time_limit = 0;
+  small.firefly = Firefly::kKeep;
+  small.adaptive = small.noise = 0;
+  small.allocate = Allocate::kEven;
+  small.error = false;
+  small.costs = CostSource::kModel;
+  small.light_splats =
+      settings.splats_to_one_pixel() ? LightSplats::kPixel : LightSplats::kFiltered;
+  small.aovs.bits = static_cast<uint32_t>(Aov::kByLightPaths);
+  small.light_groups.clear();
+  small.expressions.clear();
+  small.transport = Transport::kLight;
+  return small;
+}
+
 float brightness(const std::vector<float>& rgb, size_t pixel) {
   return luminance(Vec3<float>{rgb[3 * pixel], rgb[3 * pixel + 1], rgb[3 * pixel + 2]});
 }
@@ -215,27 +239,11 @@ TransportChoice choose_transport(const Scene& scene, const Settings& settings, u
     choice.why = "too few samples to find out whether light paths pay";
     return choice;
   }
-  Settings small = settings;
-  small.width = width;
-  small.height = height;
-  small.spp = kTransportSamples;
-  small.region.reset();
-  small.crop = false;
-  small.time_limit = 0;
-  small.firefly = Firefly::kKeep;
-  small.adaptive = small.noise = 0;
-  small.allocate = Allocate::kEven;
-  small.error = false;
-  small.costs = CostSource::kModel;
-  small.aovs.bits = 0;
-  small.light_groups.clear();
-  small.expressions.clear();
+  Settings small = pilot_settings(settings, width, height);
   TransportPilots pilots;
   pilots.width = width;
   pilots.merges = settings.merge_radius > 0;
   small.seed = kTransportSeeds[0];
-  small.transport = Transport::kLight;
-  small.aovs.bits = static_cast<uint32_t>(Aov::kByLightPaths);
   const TransportPilot squares = render(small, kCandidateShares.back(), true);
   for (size_t k = 0; k < kCandidateShares.size(); ++k)
     for (size_t i = 0; i < kTransportSeeds.size(); ++i) {

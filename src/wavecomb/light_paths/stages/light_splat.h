@@ -9,12 +9,20 @@
 
 namespace wavecomb {
 
-/// Adds a contribution of light path sample `sample` at film position (x, y), in pixels, to the
-/// sums of the surrounding pixels. The sums are integers, so that the order does not matter.
+/// Returns the film position (x, y), in pixels, of a light splat at the vertex at `depth` of the
+/// path with sample key `key`.
+inline LightSplatPoint light_splat_point(const SampleKey<float>& key, uint32_t depth, float x,
+                                         float y) {
+  const uint32_t path = hash_u32<uint32_t>(key.pixel_hash, key.sample);
+  return {x, y, hash_u32<uint32_t>(path, 0xb5297a4du + depth)};
+}
+
+/// Adds a contribution of light path sample `sample` to the sums of the pixels around `at`. The
+/// sums are integers, so that the order does not matter.
 inline void add_light_splat(const WaveContext& context, LightSplatList& list, uint32_t sample,
-                            float x, float y, const Color<float>& c) {
+                            const LightSplatPoint& at, const Color<float>& c) {
   Film& film = *context.film;
-  context.joint.filter->spread(film, x, y, [&](size_t pixel, float weight) {
+  context.joint.filter->spread(film, at, [&](size_t pixel, float weight) {
     const LightSplatList::LightSplat splat{static_cast<uint32_t>(pixel), c.x * weight, c.y * weight,
                                            c.z * weight, LightSplatLayer::is_in_half(sample)};
     film.collect(list, splat);
@@ -59,16 +67,18 @@ void splat(Wave& wave, const WaveContext& context, const WaveTask& task, uint32_
       continue;
     }
     const auto row = load_row<ShadowRow, float>(wave.pool.shadows, q.slot[i], true);
-    const float x = bits_float<float>(row.group), y = bits_float<float>(row.set);
+    const auto key = load_row<LightPathRow, float>(wave.pool.paths, q.slot[i], true).key;
+    const LightSplatPoint at =
+        light_splat_point(key, depth, bits_float<float>(row.group), bits_float<float>(row.set));
     const Color<float> c{q.r[i], q.g[i], q.b[i]};
-    add_light_splat(context, wave.joint.splats, task.first_sample + q.slot[i] % task.samples, x, y,
+    add_light_splat(context, wave.joint.splats, task.first_sample + q.slot[i] % task.samples, at,
                     c);
     if (wave.joint.aovs) [[unlikely]] {
       const auto light =
           gather_field<float>(wave.pool.paths, &LightPathRow<float>::light, q.slot[i], true);
       wave.joint.aovs.add_to_film(
           *context.film, *context.joint.filter,
-          {.slot = q.slot[i], .depth = depth, .light = light, .x = x, .y = y, .c = c});
+          {.slot = q.slot[i], .depth = depth, .light = light, .at = at, .c = c});
     }
   }
   if (context.joint.aim_samples) return;
