@@ -187,8 +187,8 @@ class PathAovs : public PathFirstHits, public PathCostRows {
   }
   bool wants_connections() const { return early_connections_ || wants_lights() || light_samples_; }
   /// Adds the contribution `c` of connections between vertices at `depth` and vertices of light
-  /// paths from `light`. Light path expressions are not changed; light_path_aovs.h adds connections
-  /// to them.
+  /// paths from `light`. Light path expressions are not changed; the joint transport adds
+  /// connections to them.
   template <typename F>
   void add_connection(uint32_t depth, const UInt<F>& slot, const UInt<F>& light, const Color<F>& c,
                       const Mask<F>& active) const {
