@@ -723,7 +723,7 @@ class Settings:
     light_aim: Literal["off", "on"]
     """How the starting points and directions of light paths are chosen. Default: on."""
     light_splats: Literal["auto", "filtered", "pixel"]
-    """How light paths contribute to pixels around the point where the camera sees them. Default:
+    """How light paths add light to the pixels around a point that the camera sees. Default:
     auto."""
     merge_radius: float
     """Radius in pixels within which light paths merge at points seen in mirrors or through glass,

@@ -121,7 +121,7 @@ def test_error_and_variance_of_a_plain_render(cornell: Any) -> None:
      {"adaptive": 0.1, "spp": 8}, {"time_limit": -1.0}],
 )  # fmt: skip
 def test_refuses_what_cannot_be(cornell: Any, settings: dict[str, Any]) -> None:
-    with pytest.raises(_core.Error, match=next(iter(settings)) + "|min_spp"):
+    with pytest.raises(wavecomb.Error, match=next(iter(settings)) + "|min_spp"):
         render(cornell, **settings)
 
 

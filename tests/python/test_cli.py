@@ -381,7 +381,6 @@ def test_scene(tmp_path: Path) -> None:
         ([], "give a NAME and -o FILE"),
         (["cornell"], "give a NAME and -o FILE"),
         (["nonsense", "-o", "a.usda"], "no scene 'nonsense'"),
-        (["cornell", "-o", "a\nb.usda"], "'a\\nb.usda': a stage's name must not contain control"),
         (["cornell", "-o", "a.txt"], ".usda, .usdc or .usd"),
         (["cornell", "-o", "/proc/nowhere/a.usda"], "/proc/nowhere/a.usda: cannot be written"),
         (["cornell", "-o", "a.usda", "--triangles", "0"], "--triangles"),

@@ -7,7 +7,6 @@
 from __future__ import annotations
 
 import dataclasses
-import unicodedata
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -104,11 +103,6 @@ def write_scene(name: str, path: Path, **options: Any) -> None:
     settings = SceneOptions(**options)
     info = SCENES[name]
     path = Path(path)
-    if any(unicodedata.category(letter) == "Cc" for letter in path.name):
-        raise SceneError(
-            f"{str(path)!r}: a stage's name must not contain control characters, such as line "
-            "breaks; choose another name, such as mixed.usda"
-        )
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         writer = StageWriter(
