@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import wavecomb
+from wavecomb.errors import ArgumentError
 
 _core = pytest.importorskip("wavecomb._core")
 
@@ -116,12 +117,15 @@ def test_error_and_variance_of_a_plain_render(cornell: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    "settings",
-    [{"adaptive": -1.0}, {"noise": 2.0}, {"adaptive": 0.1, "noise": 0.1},
-     {"adaptive": 0.1, "spp": 8}, {"time_limit": -1.0}],
+    ("settings", "kind"),
+    [({"adaptive": -1.0}, ArgumentError), ({"noise": 2.0}, ArgumentError),
+     ({"adaptive": 0.1, "noise": 0.1}, _core.Error), ({"adaptive": 0.1, "spp": 8}, _core.Error),
+     ({"time_limit": -1.0}, ArgumentError)],
 )  # fmt: skip
-def test_refuses_what_cannot_be(cornell: Any, settings: dict[str, Any]) -> None:
-    with pytest.raises(wavecomb.Error, match=next(iter(settings)) + "|min_spp"):
+def test_refuses_what_cannot_be(
+    cornell: Any, settings: dict[str, Any], kind: type[Exception]
+) -> None:
+    with pytest.raises(kind, match=next(iter(settings)) + "|min_spp"):
         render(cornell, **settings)
 
 

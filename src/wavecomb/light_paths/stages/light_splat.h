@@ -67,19 +67,16 @@ void splat(Wave& wave, const WaveContext& context, const WaveTask& task, uint32_
       continue;
     }
     const auto row = load_row<ShadowRow, float>(wave.pool.shadows, q.slot[i], true);
-    const auto key = load_row<LightPathRow, float>(wave.pool.paths, q.slot[i], true).key;
-    const LightSplatPoint at =
-        light_splat_point(key, depth, bits_float<float>(row.group), bits_float<float>(row.set));
+    const auto path = load_row<LightPathRow, float>(wave.pool.paths, q.slot[i], true);
+    const LightSplatPoint at = light_splat_point(path.key, depth, bits_float<float>(row.group),
+                                                 bits_float<float>(row.set));
     const Color<float> c{q.r[i], q.g[i], q.b[i]};
     add_light_splat(context, wave.joint.splats, task.first_sample + q.slot[i] % task.samples, at,
                     c);
-    if (wave.joint.aovs) [[unlikely]] {
-      const auto light =
-          gather_field<float>(wave.pool.paths, &LightPathRow<float>::light, q.slot[i], true);
+    if (wave.joint.aovs) [[unlikely]]
       wave.joint.aovs.add_to_film(
           *context.film, *context.joint.filter,
-          {.slot = q.slot[i], .depth = depth, .light = light, .at = at, .c = c});
-    }
+          {.slot = q.slot[i], .depth = depth, .light = path.light, .at = at, .c = c});
   }
   if (context.joint.aim_samples) return;
   context.film->take(wave.joint.splats);
