@@ -8,8 +8,8 @@
 /// 4. training: where light comes from (guiding_training.h).
 /// Each pilot returns its result, its statistics, and its run time in seconds. Except for material
 /// costs, which do not affect the image, results depend only on sample counts, not on timing, and
-/// describe the whole image. Whether and how many light paths the render uses was decided before,
-/// by a pilot that compares whole renders (light_paths/render/transport_choice.h).
+/// describe the whole image. The planner runs the pilots that decide the transport before
+/// (planner.h), because the plan of the render depends on it.
 #pragma once
 
 #include <cstddef>
