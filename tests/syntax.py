@@ -13,8 +13,12 @@ from parts import not_here
 ROOT = Path(__file__).resolve().parents[1]
 
 
-def command() -> list[str]:
-    """Returns the library's compiler command for a syntax check, without the folder of headers."""
+def command(check_only: bool = True) -> list[str]:
+    """Returns the library's compiler command, without the folder of headers.
+
+    Args:
+        check_only: Whether the command only checks the syntax of its files.
+    """
     commands = ROOT / "build" / "editable" / "compile_commands.json"
     if not commands.exists():
         not_here("the library was not built by make build")
@@ -27,4 +31,4 @@ def command() -> list[str]:
             kept += [word, words[at + 1]]
         elif re.match(r"-(std|march|D|W(all|extra|error|shadow))", word):
             kept.append(word)
-    return [*kept, "-Wno-psabi", "-fsyntax-only"]
+    return [*kept, "-Wno-psabi", "-fsyntax-only" if check_only else "-O1"]

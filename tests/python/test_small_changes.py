@@ -43,25 +43,93 @@ def page(name: str, language: str = "cpp") -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
 
 
-def program(row: str) -> Change:
-    """Returns the program of docs/writing-a-material.md, with a row of the table."""
+PROGRAMS = {
+    "minnaert": ("minnaert", "Minnaert", "0", 65),
+    "nests": ("minnaert", "Minnaert", "kEmits | kGlossy | kNests | kSubsurface", 65),
+    "transmits": ("leaf", "Leaf", "0", 60),
+    "layers": ("lacquer", "Lacquer", "kLayered", 90),
+}
+"""Programs of docs/writing-a-material.md: name, class, traits and cost of their rows."""
+EXAMPLES = ROOT / "examples" / "programs"
+
+
+def program(name: str, klass: str, traits: str, cost: int) -> Change:
+    """Returns a program with a row of the table."""
     table = "material/description/programs.h"
     hair = '#include "wavecomb/material/programs/hair.h"\n'
+    own = EXAMPLES / f"{name}.h"
+    text = own.read_text("utf-8") if own.exists() else page("writing-a-material")[0]
+    row = f"  X({name}, {klass}, {traits}, {cost})"
     return {
-        f"{CORE}/material/programs/minnaert.h": ("", page("writing-a-material")[0]),
+        f"{CORE}/material/programs/{name}.h": ("", text),
         f"{CORE}/{table}": last_row(table, "WAVECOMB_PROGRAMS", row),
-        f"{CORE}/material/program_table.h": (hair, f"{hair}{hair.replace('hair', 'minnaert')}"),
+        f"{CORE}/material/program_table.h": (hair, f"{hair}{hair.replace('hair', name)}"),
     }
 
 
 USES_PROGRAM = (
     header("program_table.h")
+    + header("openpbr_params.h")
     + """
+#include <cmath>
+#include <cstdio>
 namespace wavecomb {
-template class MinnaertBsdf<float>;
+template class CLASSBsdf<float>;
 static_assert(Programs<float>::kSize == kSurfaceProgramCount);
-static_assert(has_trait(ProgramId::kMinnaert, program_trait::kNests) == NESTS);
-static_assert(std::is_same_v<Program<ProgramId::kMinnaert, float>, MinnaertBsdf<float>>);
+static_assert(has_trait(ProgramId::kCLASS, program_trait::kNests) == NESTS);
+static_assert(std::is_same_v<Program<ProgramId::kCLASS, float>, CLASSBsdf<float>>);
+
+Vec3<float> direction(float z, float phi) {
+  const float r = std::sqrt(1 - z * z);
+  return {r * std::cos(phi), r * std::sin(phi), z};
+}
+int faults = 0;
+void expect(bool holds, const char* what, float z) {
+  if (holds) return;
+  std::printf("%s, at cosine %g\\n", what, double{z});
+  ++faults;
+}
+
+// The density integrates to the probability of the lobes that are not delta lobes, samples agree
+// with eval, directions can be exchanged, and a white surface reflects at most what arrives.
+void check(const CLASSBsdf<float>& bsdf, float z) {
+  const Vec3<float> wo = direction(z, 0.4f);
+  constexpr int kSteps = 200;
+  double integral = 0, furnace = 0;
+  bool agrees = true, is_reciprocal = true;
+  for (int i = 0; i < kSteps; ++i)
+    for (int k = 0; k < kSteps; ++k) {
+      const float u = (i + 0.5f) / kSteps, v = (k + 0.5f) / kSteps;
+      const float lobe = std::fmod(0.618034f * (i * kSteps + k), 1.f);
+      const Vec3<float> wi = direction(2 * u - 1, 6.2831853f * v);
+      const BsdfEval<float> e = bsdf.eval(wo, wi), back = bsdf.eval(wi, wo);
+      integral += double{e.pdf};
+      is_reciprocal &= std::abs(e.f_cos.x * std::abs(z) - back.f_cos.x * std::abs(wi.z)) < 1e-5f;
+      const BsdfSample<float> s = bsdf.sample(wo, lobe, u, v);
+      furnace += double{s.weight.x};
+      const BsdfEval<float> at = bsdf.eval(wo, s.wi);
+      agrees &= s.is_delta || (std::abs(at.pdf - s.pdf) < 1e-4f &&
+                               std::abs(s.weight.x * s.pdf - at.f_cos.x) < 1e-4f);
+    }
+  integral *= 4 * 3.14159265 / (kSteps * kSteps);
+  const double rest = 1 - double{bsdf.delta_probability(wo)};
+  expect(std::abs(integral - rest) < 2e-3, "the density does not integrate to 1", z);
+  expect(furnace < 1.001 * kSteps * kSteps, "the program gains energy", z);
+  expect(is_reciprocal, "the program is not reciprocal", z);
+  expect(agrees, "a sample does not agree with eval", z);
+}
+}
+
+int main() {
+  using namespace wavecomb;
+  for (float amount : {0.f, 0.3f, 1.f}) {
+    OpenPbrParams<float> p{};
+    p.base_color = {1, 1, 1};
+    p.roughness = p.opacity = p.clearcoat = amount;
+    p.coat_ior = 1.5f;
+    for (float z : {-0.9f, 0.05f, 0.5f, 1.f}) check(CLASSBsdf<float>(p, false), z);
+  }
+  return faults > 0;
 }
 """
 )
@@ -178,14 +246,11 @@ OF_HIT = aov(
     "  put(Aov::kDistance, hit.distance);\n  put(Aov::kHeight, hit.position.y);\n",
 )
 OF_TECHNIQUE = aov(
-    '  X(ByCamera, "by_camera", 3, "RGB", kLight, kMean, kMis, "Found by camera paths")',
-    "aov/path_aovs.cpp",
-    "  if (light_samples_) {\n",
-    "  if (double* sums = film.sums(Aov::kByCamera, pixel))\n"
-    "    slots.for_each([&](uint32_t slot) {\n"
-    "      for (size_t c = 0; c < 3; ++c) sums[c] += double{radiance[slot * kRadianceWords + c]};\n"
-    "    });\n"
-    "  if (light_samples_) {\n",
+    '  X(ByConnections, "by_connections", 3, "RGB", kLight, kMean, kTechnique, "Connections")',
+    "aov/path_aovs.h",
+    "    {Aov::kByLightSamples, Technique::kLightSample | Technique::kConnection},\n",
+    "    {Aov::kByLightSamples, Technique::kLightSample | Technique::kConnection},\n"
+    "    {Aov::kByConnections, Technique::kConnection},\n",
 )
 
 
@@ -265,18 +330,23 @@ def compiled(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("nests", [False, True])
-def test_a_program(tmp_path: Path, compiler: list[str], nests: bool) -> None:
-    traits = "kEmits | kGlossy | kNests | kSubsurface" if nests else "0"
-    change = program(f"  X(minnaert, Minnaert, {traits}, 65)")
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_a_program(tmp_path: Path, compiler: list[str], name: str) -> None:
+    """Programs that nest, transmit or layer take three files, compile, and are valid BSDFs."""
+    row = PROGRAMS[name]
+    change = program(*row)
     assert len(change) <= 3
     applied(tmp_path, change)
-    done = compiled(
-        tmp_path, compiler, text=USES_PROGRAM.replace("NESTS", "true" if nests else "false")
-    )
+    nests = "true" if "kNests" in row[2] else "false"
+    text = USES_PROGRAM.replace("CLASS", row[1]).replace("NESTS", nests)
+    (tmp_path / "use.cpp").write_text(text)
+    command = [*syntax.command(check_only=False), "-I", str(tmp_path / "src")]
+    built = [*command, str(tmp_path / "use.cpp"), "-o", str(tmp_path / "use")]
+    done = subprocess.run(built, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    others = ("scene_materials.cpp", "mesh_medium.cpp")
-    done = compiled(tmp_path, compiler, *others)
+    done = subprocess.run([tmp_path / "use"], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+    done = compiled(tmp_path, compiler, "scene_materials.cpp", "mesh_medium.cpp")
     assert done.returncode == 0, done.stderr
 
 

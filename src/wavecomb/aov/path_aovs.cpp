@@ -118,13 +118,18 @@ void PathAovs::resolve_light(AovFilm& film, size_t pixel, const SlotRange& slots
       for (uint32_t i = 0; i < 3 * layout_.expressions; ++i) sums[i] += double{found[i]};
     });
   }
-  if (light_samples_) {
-    double* sampled = film.sums(Aov::kByLightSamples, pixel);
-    double* bounced = film.sums(Aov::kByBounces, pixel);
+  for (size_t i = 0; i < std::size(kTechniqueAovs); ++i) {
+    double* sums = film.sums(kTechniqueAovs[i].aov, pixel);
     slots.for_each([&](uint32_t slot) {
-      const float* row = light_samples_.rows + slot * kRadianceWords;
-      for (size_t c = 0; c < 3 && sampled; ++c) sampled[c] += double{row[c]};
-      add_difference(bounced, radiance + slot * kRadianceWords, row);
+      const float* row = by_technique_[i].rows + slot * kRadianceWords;
+      for (size_t c = 0; c < 3 && sums; ++c) sums[c] += double{row[c]};
+    });
+  }
+  if (double* bounced = film.sums(Aov::kByBounces, pixel)) {
+    const Block& sampled = by_technique_[technique_index(Aov::kByLightSamples)];
+    slots.for_each([&](uint32_t slot) {
+      const size_t row = slot * kRadianceWords;
+      add_difference(bounced, radiance + row, sampled.rows + row);
     });
   }
 }

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-/// AOV values of paths. Each integrator owns a `PathAovs` object, which stores AOV values for each
-/// path slot. The integrator calls these member functions for the events of a path:
+/// AOV values of paths, stored for each path slot until they are added to the film. Integrators
+/// report events of paths to `PathEvents` (path_events.h), which calls these member functions:
 ///
-///   begin      a camera ray starts (first_hits.h)
-///   hit_light, hit_surface   the camera ray has its first hit
-///   vertex     a vertex was shaded
-///   add        a light contributes to the path
-///   end_depth  the radiance includes the emission at vertex `depth`, but not its light sample
-///   resolve    the path's values are added to the film
+///   begin, hit_light, hit_surface, hit_volume   first_hits.h
+///   vertex       a vertex was shaded
+///   light        light contributes to the path
+///   end_depth    the radiance includes the emission at vertex `depth`, but not its light sample
+///   resolve      the path's values are added to the film
 ///
 /// Only the requested AOVs are stored. Splitting the radiance into emission, direct and indirect
 /// light adds no work to shading, since it only needs copies of the radiance before the light
@@ -17,6 +16,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <iterator>
 
 #include "wavecomb/aov/aov_tables.h"
 #include "wavecomb/aov/cost_rows.h"
@@ -30,6 +30,39 @@
 #include "wavecomb/path/path_state.h"
 
 namespace wavecomb {
+
+/// Technique by which a path finds the light of a contribution, one bit each.
+enum class Technique : uint32_t {
+  kEmitter = 1,      ///< A ray of the camera or of a bounce hits an emitter or leaves the scene.
+  kVolume = 2,       ///< A ray of the camera or of a bounce passes an emissive volume.
+  kLightSample = 4,  ///< A shadow ray reaches a sampled point on a light.
+  kConnection = 8,   ///< A shadow ray reaches a vertex of a light path.
+};
+constexpr uint32_t operator|(Technique a, Technique b) {
+  return static_cast<uint32_t>(a) | static_cast<uint32_t>(b);
+}
+
+/// AOV that sums the contributions of some techniques.
+struct TechniqueAov {
+  Aov aov;
+  uint32_t techniques;  ///< bits of `Technique`
+
+  constexpr TechniqueAov(Aov of, uint32_t bits) : aov(of), techniques(bits) {}
+  constexpr TechniqueAov(Aov of, Technique one) : TechniqueAov(of, static_cast<uint32_t>(one)) {}
+};
+/// AOVs that sum contributions by technique. `kByBounces` is the rest of the radiance without
+/// `kByLightSamples`.
+inline constexpr TechniqueAov kTechniqueAovs[] = {
+    {Aov::kByLightSamples, Technique::kLightSample | Technique::kConnection},
+};
+
+/// Contribution of light to paths.
+template <typename F>
+struct LightEvent {
+  uint32_t depth;  ///< of the vertex where the path found the light
+  const UInt<F>& slot;
+  const Color<F>& c;
+};
 
 /// Calls `put(aov, value)` for each AOV whose source is `kVertex`, with values of the first vertex.
 /// `value` has the channels of the AOV, and `path` is the path's state before the vertex.
@@ -73,13 +106,21 @@ class PathAovs : public PathFirstHits, public PathCostRows {
       expressions_ =
           PathExpressions(capacity, tables->automaton, tables->end_of_light, tables->multipliers);
     rows(guides_, set.has(AovSource::kGuide), kRowWords<GuideRow>);
-    rows(light_samples_, set.has(AovSource::kMis), kRadianceWords);
+    for (size_t i = 0; i < std::size(kTechniqueAovs); ++i) {
+      const auto& [aov, techniques] = kTechniqueAovs[i];
+      const uint32_t users = aov == Aov::kByLightSamples ? aov | Aov::kByBounces : uint32_t(aov);
+      rows(by_technique_[i], set.any(users), kRadianceWords);
+      if (by_technique_[i]) wanted_techniques_ |= techniques;
+    }
+    if (wants_lights()) wanted_techniques_ = ~0u;
+    if (early_connections_) wanted_techniques_ |= static_cast<uint32_t>(Technique::kConnection);
     rows(bounces_, set.has(AovSource::kBounce), kRowWords<BounceRow>);
   }
 
   size_t bytes() const {
     size_t n = expressions_.bytes() + hit_bytes() + cost_bytes();
     for (const Block* block : blocks()) n += block->bytes();
+    for (const Block& block : by_technique_) n += block.bytes();
     return n;
   }
 
@@ -87,9 +128,9 @@ class PathAovs : public PathFirstHits, public PathCostRows {
 
   /// Sets the AOV values of the first `slots` path slots to 0.
   void clear(size_t slots) {
-    for (const Block* block :
-         {&vertex_, &guides_, &groups_, &light_samples_, &bounces_, &early_connections_})
+    for (const Block* block : {&vertex_, &guides_, &groups_, &bounces_, &early_connections_})
       block->zero(slots);
+    for (const Block& block : by_technique_) block.zero(slots);
     clear_hits(slots);
     clear_costs(slots);
     expressions_.clear(slots);
@@ -139,7 +180,11 @@ class PathAovs : public PathFirstHits, public PathCostRows {
 
   // ---- light ------------------------------------------------------------------------------------
 
-  /// Returns whether callers must report contributions separately for each light.
+  /// Returns whether contributions of `technique` change an AOV.
+  bool wants(Technique technique) const {
+    return (wanted_techniques_ & static_cast<uint32_t>(technique)) != 0;
+  }
+  /// Returns whether some AOV separates the contributions of lights.
   bool wants_lights() const { return groups_ || expressions_; }
   /// Returns the index of the stored light group of each lane's light, or kNoGroup.
   template <typename F>
@@ -148,63 +193,49 @@ class PathAovs : public PathFirstHits, public PathCostRows {
     return film_group<F>(tables_->film_group.data(), light, active);
   }
   const PathExpressions& expressions() const { return expressions_; }
-  /// Adds `c`, a contribution of the light `light`, to the paths of the active lanes, whose slots
-  /// must be distinct. `light` may be `kNoLight`.
-  template <typename F>
-  void add_light(const UInt<F>& slot, const UInt<F>& light, const Color<F>& c,
-                 const Mask<F>& active) const {
-    if (groups_) add<F>(slot, group_of<F>(light, active), c, active);
-    if (expressions_) expressions_.add<F>(slot, light, c, active);
+
+  /// Adds a contribution to the AOVs of the paths in the active lanes, whose slots must be
+  /// distinct. `source` is the light, or kNoLight; for light samples, it is the result of
+  /// group_of(), and for volumes it is not used. Connections do not change light path expressions,
+  /// because the joint transport knows their events.
+  template <Technique kTechnique, typename F>
+  void light(const LightEvent<F>& e, const UInt<F>& source, const Mask<F>& active) const {
+    constexpr bool kIsVolume = kTechnique == Technique::kVolume;
+    constexpr bool kIsSample = kTechnique == Technique::kLightSample;
+    if (groups_) {
+      UInt<F> group = source;
+      if constexpr (kIsVolume)
+        group = UInt<F>(tables_->group_of_rest);
+      else if constexpr (!kIsSample)
+        group = group_of<F>(source, active);
+      add_to_group<F>(e.slot, group, e.c, active);
+    }
+    if (expressions_) {
+      if constexpr (kIsVolume)
+        expressions_.add_volume_emission<F>(e.slot, e.c, active);
+      else if constexpr (kIsSample)
+        expressions_.add_light_sample<F>(e.slot, e.c, active);
+      else if constexpr (kTechnique == Technique::kEmitter)
+        expressions_.add<F>(e.slot, source, e.c, active);
+    }
+    add_by_technique<kTechnique, F>(e.slot, e.c, active);
+    if constexpr (kTechnique == Technique::kConnection)
+      if (early_connections_ && e.depth == 0)
+        add_radiance<F>(early_connections_.rows, e.slot, e.c, active);
   }
-  /// Adds `c`, the emission of volumes, to paths.
+  /// Adds `c`, the emission of infinite lights, to the paths of the active lanes, which hit no
+  /// geometry. `path` is their state at the last vertex.
   template <typename F>
-  void add_volume_emission(const UInt<F>& slot, const Color<F>& c, const Mask<F>& active) const {
-    if (groups_) add<F>(slot, UInt<F>(tables_->group_of_rest), c, active);
-    if (expressions_) expressions_.add_volume_emission<F>(slot, c, active);
-  }
-  /// Adds `c`, the contribution of a light sample at the last vertex, to paths. The sampled light
-  /// belongs to the light group `group`.
-  template <typename F>
-  void add_direct(const UInt<F>& slot, const UInt<F>& group, const Color<F>& c,
-                  const Mask<F>& active) const {
-    if (groups_) add<F>(slot, group, c, active);
-    if (expressions_) expressions_.add_light_sample<F>(slot, c, active);
-  }
-  /// Adds the contribution `c` to the light group `group`, but not to other AOVs.
-  template <typename F>
-  void add(const UInt<F>& slot, const UInt<F>& group, const Color<F>& c,
-           const Mask<F>& active) const {
-    const Mask<F> grouped = active & Mask<F>(group != UInt<F>(kNoGroup));
-    if (any(grouped))
-      add_radiance<F>(groups_.rows, slot * layout_.light_groups + group, c, grouped);
-  }
-  bool wants_light_samples() const { return bool(light_samples_); }
-  /// Adds `c`, the contribution of light samples, to the paths of the active lanes, whose slots
-  /// must be distinct.
-  template <typename F>
-  void add_light_sample(const UInt<F>& slot, const Color<F>& c, const Mask<F>& active) const {
-    add_radiance<F>(light_samples_.rows, slot, c, active);
-  }
-  bool wants_connections() const { return early_connections_ || wants_lights() || light_samples_; }
-  /// Adds the contribution `c` of connections between vertices at `depth` and vertices of light
-  /// paths from `light`. Light path expressions are not changed; the joint transport adds
-  /// connections to them.
-  template <typename F>
-  void add_connection(uint32_t depth, const UInt<F>& slot, const UInt<F>& light, const Color<F>& c,
-                      const Mask<F>& active) const {
-    if (early_connections_ && depth == 0) add_radiance<F>(early_connections_.rows, slot, c, active);
-    if (groups_) add<F>(slot, group_of<F>(light, active), c, active);
-    if (light_samples_) add_light_sample<F>(slot, c, active);
-  }
-  /// Adds the emission of infinite lights to the paths of the active lanes, which hit no geometry.
-  template <typename F>
-  void add_environment(const SceneView& scene, const ShadeSettings& settings, uint32_t depth,
-                       const UInt<F>& slot, const PathState<F>& path, const Mask<F>& active) const {
+  void environment(const SceneView& scene, const ShadeSettings& settings, const LightEvent<F>& e,
+                   const PathState<F>& path, const Mask<F>& active) const {
+    add_by_technique<Technique::kEmitter, F>(e.slot, e.c, active);
+    if (!wants_lights()) return;
     split_environment<F>(
-        scene, settings, depth, path, active,
+        scene, settings, e.depth, path, active,
         [&](uint32_t light) { return expressions_ || tables_->film_group[light] != kNoGroup; },
         [&](uint32_t light, const Color<F>& share) {
-          add_light<F>(slot, UInt<F>(light), share, active);
+          if (groups_) add_to_group<F>(e.slot, group_of<F>(UInt<F>(light), active), share, active);
+          if (expressions_) expressions_.add<F>(e.slot, UInt<F>(light), share, active);
         });
   }
 
@@ -231,7 +262,7 @@ class PathAovs : public PathFirstHits, public PathCostRows {
     scale(early_connections_, kRadianceWords);
     scale(groups_, kRadianceWords * layout_.light_groups);
     expressions_.scale(exposure, slots);
-    scale(light_samples_, kRadianceWords);
+    for (const Block& sums : by_technique_) scale(sums, kRadianceWords);
   }
   /// Adds the values of the paths in the slots [begin, end) to the pixel `pixel` of the film, in
   /// the order of slots. `radiance` points to an array with a `RadianceRow` for each slot.
@@ -265,9 +296,29 @@ class PathAovs : public PathFirstHits, public PathCostRows {
   template <typename Put>
   void for_each_vertex_aov(AovKind kind, const Put& put) const;
 
-  std::array<const Block*, 8> blocks() const {
-    return {&vertex_, &parts_[0], &parts_[1],      &early_connections_,
-            &groups_, &guides_,   &light_samples_, &bounces_};
+  std::array<const Block*, 7> blocks() const {
+    return {&vertex_, &parts_[0], &parts_[1], &early_connections_, &groups_, &guides_, &bounces_};
+  }
+  /// Returns the index of an AOV in `kTechniqueAovs`.
+  static constexpr size_t technique_index(Aov aov) {
+    size_t i = 0;
+    while (kTechniqueAovs[i].aov != aov) ++i;
+    return i;
+  }
+
+  /// Adds `c` to the sums of one light group, or to none if `group` is kNoGroup.
+  template <typename F>
+  void add_to_group(const UInt<F>& slot, const UInt<F>& group, const Color<F>& c,
+                    const Mask<F>& active) const {
+    const Mask<F> grouped = active & Mask<F>(group != UInt<F>(kNoGroup));
+    if (any(grouped))
+      add_radiance<F>(groups_.rows, slot * layout_.light_groups + group, c, grouped);
+  }
+  template <Technique kTechnique, typename F>
+  void add_by_technique(const UInt<F>& slot, const Color<F>& c, const Mask<F>& active) const {
+    for (size_t i = 0; i < std::size(kTechniqueAovs); ++i)
+      if ((kTechniqueAovs[i].techniques & static_cast<uint32_t>(kTechnique)) && by_technique_[i])
+        add_radiance<F>(by_technique_[i].rows, slot, c, active);
   }
 
   /// Value in `vertex_at_` for AOVs that `vertex_` does not store.
@@ -316,7 +367,8 @@ class PathAovs : public PathFirstHits, public PathCostRows {
   Block groups_;  ///< radiance of each light group; the values of a slot are adjacent
   Block guides_, bounces_;
   PathExpressions expressions_;
-  Block light_samples_;  ///< contributions of light samples
+  std::array<Block, std::size(kTechniqueAovs)> by_technique_;  ///< in the order of kTechniqueAovs
+  uint32_t wanted_techniques_ = 0;  ///< techniques whose contributions change an AOV
 };
 
 }  // namespace wavecomb

@@ -35,8 +35,7 @@ enum class AovSource : uint8_t {
   kVertex,  ///< The value is known after the first vertex has been shaded.
   kGuide,   ///< The value is known after the last vertex that provides denoiser features.
   kLight,   ///< The value changes whenever light contributes to the path.
-  kMis,     ///< The value changes whenever light contributes to the path, and depends on whether a
-            ///< light sample or a bounce found the light.
+  kTechnique,  ///< The value is the light that some techniques have found, such as light samples.
   kTime,    ///< The value is a time measured with the clock.
   kBounce,  ///< The value accumulates over all bounces of the path.
 };
@@ -50,6 +49,8 @@ enum class AovContent : uint8_t {
   kId,         ///< index of an object or material, or hashes of names
   kExact,      ///< number that must be stored without lossy compression
   kValue,      ///< any other number, which the window displays in false colours
+  kMagnitude,  ///< positive number of any order of magnitude, which the window displays in false
+               ///< colours on a logarithmic scale
 };
 
 /// Table of the AOVs with rows `X(enumerator, name, channels, letters, content, kind, source,
@@ -58,37 +59,38 @@ enum class AovContent : uint8_t {
 /// or "" if the channels have no names. `title` is the label of the layer in the window, which does
 /// not show layers with the title "".
 // clang-format off
-#define WAVECOMB_AOVS(X)                                                                         \
-  X(Albedo, "albedo", 3, "RGB", kColour, kMean, kVertex, "Albedo")                               \
-  X(Normal, "normal", 3, "XYZ", kDirection, kMean, kVertex, "Normal")                            \
-  X(Depth, "depth", 1, "Z", kValue, kMeanOfHits, kHit, "Depth")                                  \
-  X(Position, "position", 3, "XYZ", kExact, kNearest, kHit, "Position")                          \
-  X(Uv, "uv", 2, "UV", kValue, kNearest, kVertex, "Texture coordinates")                         \
-  X(MaterialId, "material_id", 1, "", kId, kNearest, kHit, "Materials")                          \
-  X(InstanceId, "instance_id", 1, "", kId, kNearest, kHit, "Instances")                          \
-  X(CryptoObject, "crypto_object", 0, "", kId, kCoverage, kHit, "Objects (Cryptomatte)")         \
-  X(CryptoMaterial, "crypto_material", 0, "", kId, kCoverage, kHit, "Materials (Cryptomatte)")   \
-  X(CryptoAsset, "crypto_asset", 0, "", kId, kCoverage, kHit, "Assets (Cryptomatte)")            \
-  X(Emission, "emission", 3, "RGB", kLight, kMean, kLight, "Emission")                           \
-  X(Direct, "direct", 3, "RGB", kLight, kMean, kLight, "Direct light")                           \
-  X(Indirect, "indirect", 3, "RGB", kLight, kMean, kLight, "Indirect light")                     \
-  X(LightGroups, "light_groups", 0, "RGB", kLight, kGroups, kLight, "")                          \
-  X(Cost, "cost", 1, "", kValue, kSum, kTime, "Cost per pixel")                                  \
-  X(GuideAlbedo, "guide_albedo", 3, "RGB", kColour, kMean, kGuide, "")                           \
-  X(GuideNormal, "guide_normal", 3, "XYZ", kDirection, kMean, kGuide, "")                        \
-  X(Alpha, "alpha", 1, "", kValue, kMean, kHit, "Alpha")                                         \
-  X(ByBounces, "by_bounces", 3, "RGB", kLight, kMean, kMis, "Found by bounces")                  \
-  X(ByLightSamples, "by_light_samples", 3, "RGB", kLight, kMean, kMis, "Found by light samples") \
-  X(ByLightPaths, "by_light_paths", 3, "RGB", kLight, kMean, kMis, "Found by light paths")       \
-  X(GuidedShare, "guided_share", 1, "", kValue, kMean, kBounce, "Guided share")                  \
-  X(Survival, "survival", 1, "", kValue, kMean, kBounce, "Survival of roulette")                 \
-  X(Expressions, "lpe", 0, "RGB", kLight, kExpressions, kLight, "")                              \
-  X(DepthNearest, "depth_nearest", 1, "Z", kExact, kNearest, kHit, "Depth, unfiltered")          \
-  X(Distance, "distance", 1, "", kExact, kNearest, kHit, "Distance, unfiltered")                 \
-  X(Motion, "motion", 2, "UV", kExact, kNearest, kHit, "Motion in the picture")                  \
-  X(Deep, "deep", 0, "", kValue, kDeep, kHit, "")                                                \
-  X(Transmittance, "transmittance", 3, "RGB", kColour, kMean, kHit, "Transmittance of volumes")  \
-  X(HalfDepth, "half_depth", 1, "Z", kValue, kMedian, kHit, "Depth to half opacity")
+#define WAVECOMB_AOVS(X)                                                                          \
+  X(Albedo, "albedo", 3, "RGB", kColour, kMean, kVertex, "Albedo")                                \
+  X(Normal, "normal", 3, "XYZ", kDirection, kMean, kVertex, "Normal")                             \
+  X(Depth, "depth", 1, "Z", kValue, kMeanOfHits, kHit, "Depth, scene units")                      \
+  X(Position, "position", 3, "XYZ", kExact, kNearest, kHit, "Position")                           \
+  X(Uv, "uv", 2, "UV", kValue, kNearest, kVertex, "Texture coordinates")                          \
+  X(MaterialId, "material_id", 1, "", kId, kNearest, kHit, "Materials")                           \
+  X(InstanceId, "instance_id", 1, "", kId, kNearest, kHit, "Instances")                           \
+  X(CryptoObject, "crypto_object", 0, "", kId, kCoverage, kHit, "Objects (Cryptomatte)")          \
+  X(CryptoMaterial, "crypto_material", 0, "", kId, kCoverage, kHit, "Materials (Cryptomatte)")    \
+  X(CryptoAsset, "crypto_asset", 0, "", kId, kCoverage, kHit, "Assets (Cryptomatte)")             \
+  X(Emission, "emission", 3, "RGB", kLight, kMean, kLight, "Emission")                            \
+  X(Direct, "direct", 3, "RGB", kLight, kMean, kLight, "Direct light")                            \
+  X(Indirect, "indirect", 3, "RGB", kLight, kMean, kLight, "Indirect light")                      \
+  X(LightGroups, "light_groups", 0, "RGB", kLight, kGroups, kLight, "")                           \
+  X(Cost, "cost", 1, "", kMagnitude, kSum, kTime, "Cost, ns per pixel")                           \
+  X(GuideAlbedo, "guide_albedo", 3, "RGB", kColour, kMean, kGuide, "")                            \
+  X(GuideNormal, "guide_normal", 3, "XYZ", kDirection, kMean, kGuide, "")                         \
+  X(Alpha, "alpha", 1, "", kValue, kMean, kHit, "Alpha")                                          \
+  X(ByBounces, "by_bounces", 3, "RGB", kLight, kMean, kTechnique, "Found by bounces")             \
+  X(ByLightSamples, "by_light_samples", 3, "RGB", kLight, kMean, kTechnique,                      \
+    "Found by light samples")                                                                     \
+  X(ByLightPaths, "by_light_paths", 3, "RGB", kLight, kMean, kTechnique, "Found by light paths")  \
+  X(GuidedShare, "guided_share", 1, "", kValue, kMean, kBounce, "Guided share")                   \
+  X(Survival, "survival", 1, "", kValue, kMean, kBounce, "Survival of roulette")                  \
+  X(Expressions, "lpe", 0, "RGB", kLight, kExpressions, kLight, "")                               \
+  X(DepthNearest, "depth_nearest", 1, "Z", kExact, kNearest, kHit, "Depth, unfiltered")           \
+  X(Distance, "distance", 1, "", kExact, kNearest, kHit, "Distance, unfiltered")                  \
+  X(Motion, "motion", 2, "UV", kExact, kNearest, kHit, "Motion in the picture")                   \
+  X(Deep, "deep", 0, "", kValue, kDeep, kHit, "")                                                 \
+  X(Transmittance, "transmittance", 3, "RGB", kColour, kMean, kHit, "Transmittance of volumes")   \
+  X(HalfDepth, "half_depth", 1, "Z", kValue, kMedian, kHit, "Depth to half opacity, scene units")
 // clang-format on
 
 namespace detail {

@@ -150,12 +150,13 @@ class LightPathAovs {
     store_row<ConnectionStateRow, F>(connections_.rows, slot, row, active);
   }
 
-  /// Adds the contribution `c` of connections to the light path expressions of camera paths.
+  /// Adds the contribution `c` of connections to the light path expressions of camera paths, if
+  /// there are any.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void connect(const PathExpressions& to, const UInt<F>& slot,
                                             const Color<F>& c, const Mask<F>& active) const {
     using U = UInt<F>;
-    if (none(active)) return;
+    if (!connections_ || none(active)) return;
     const ConnectionStateRow<F> row =
         load_row<ConnectionStateRow, F>(connections_.rows, slot, active);
     const auto split = [](const Color<F>& all, const Color<F>& share, const auto& add) {

@@ -25,9 +25,9 @@ struct NoJointTracer {
   NoJointTracer(const WaveContext& /*context*/, ReferenceWorker& /*worker*/) {}
   /// Begins a camera path. An implementation may trace the light paths that the camera path needs.
   void begin(uint32_t /*pixel*/, uint32_t /*sample*/) {}
-  /// Processes the path vertex at `depth` after its shadow ray was traced, and returns the joint
-  /// transport's contribution to the radiance of the path. `rays` traces the rays of the path.
-  Color<float> use_vertex(uint32_t /*depth*/, SingleRays& /*rays*/) { return Color<float>(0.f); }
+  /// Processes the path vertex at `depth` after its shadow ray was traced, and adds the joint
+  /// transport's contribution to the path. `rays` traces the rays of the path.
+  void use_vertex(uint32_t /*depth*/, SingleRays& /*rays*/) {}
   /// Ends a path whose radiance was added to the film pixel with the given index.
   void end(size_t /*index*/) {}
   void end_task(const WaveTask& /*task*/) {}
@@ -43,6 +43,7 @@ class PathTracer : PathRecorder {
       : PathRecorder(context, worker),
         media_(media),
         clock_(worker.clock),
+        history_(worker.history),
         buffers_(worker.joint),
         joint_(context, worker) {}
 
@@ -74,7 +75,7 @@ class PathTracer : PathRecorder {
     out.luminance[path] = luminance(radiance_.sum);
     out.counts[path] = probe_count_;
   }
-  const float* radiance() const { return reinterpret_cast<const float*>(&radiance_); }
+  const float* radiance() const { return &radiance_.sum.x; }
 
  private:
   /// Traces one camera path. Returns the number of depths for which end_depth() has stored the
@@ -109,7 +110,6 @@ class PathTracer : PathRecorder {
       if (depth == 0 && on_surface && scene.visibility &&
           is_holdout<F>(scene, hit.inst, hit.geom, true))
         return depth;
-      if (depth == 0 && aovs_.wants_alpha()) aovs_.cover<F>(kSlot, true);
       const uint32_t mesh = on_surface ? rays_.mesh_of(hit) : 0;
       uint32_t material = on_surface ? rays_.material_of(hit, mesh) : hit.event_material;
       if constexpr (Media::kStreams)
@@ -117,7 +117,7 @@ class PathTracer : PathRecorder {
       if (depth == 0) note_first_hit(path.dir, p, hit, mesh, material);
       if (on_surface && settings_.cost_aware && depth >= settings_.roulette_depth) {
         const F q = cost_aware_survival<F>(scene, *context_.roulette_costs, material, path, true);
-        aovs_.survive<F>(depth, kSlot, q, true);
+        events_.survive<F>(depth, kSlot, q, true);
         if (!(cost_aware_number<F>(key, depth) < q)) return depth;
         path.throughput *= 1.f / q;
       }
@@ -134,9 +134,11 @@ class PathTracer : PathRecorder {
       if (context_.has_medium_stack()) {
         medium_stack_.crossed = v.crossed;
       }
-      note_vertex(key, depth, {.path = path, .t = hit.t, .material = material, .result = v}, aovs);
-      const bool is_free = v.has_shadow && trace_shadow(key, depth, v, aovs);
-      radiance_.sum += joint_.use_vertex(depth, rays_);
+      const ShadedVertex<F> shaded{.path = path, .t = hit.t, .material = material, .result = v};
+      const uint32_t group = events_.vertex<true, F>({depth, kSlot, key, shaded, aovs}, true);
+      aovs_.end_depth(depth, radiance(), 1);
+      const bool is_free = v.has_shadow && trace_shadow(key, depth, v, group);
+      joint_.use_vertex(depth, rays_);
       if (!probes_.empty() && aovs.light_weight >= 0.f)
         record_choice(v, aovs, is_free ? luminance(v.direct) : 0.f);
       if (!v.alive) return depth + 1;
@@ -172,36 +174,26 @@ class PathTracer : PathRecorder {
   void pass_media(const SampleKey<F>& key, uint32_t depth, PathState<F>& path, SingleHit& hit) {
     const Flight<F> flight = sample_flight(key, depth, path, hit);
     if constexpr (Media::kHasEmission)
-      if (media_.has_emission())
-        add_volume_emission(clean<F>(
+      if (media_.has_emission()) {
+        const Color<F> c = clean<F>(
             path.throughput * media_.template emission<F>(passage_of(key, depth, path, hit), true),
-            clamp_limit(settings_, depth)));
+            clamp_limit(settings_, depth));
+        events_.light<Technique::kVolume, F>({depth, kSlot, c}, [] { return kNoLight; }, true);
+      }
     path.throughput = path.throughput * flight.weight;
-    record_segment(depth, flight, path.throughput);
+    events_.segment<F>(depth, kSlot, flight, path.throughput, true);
     if (flight.stopped) hit = {flight.t, 0.f, 0.f, 0, 0, kNoSurface, flight.material};
   }
 
-  /// Adds the emission of a shaded vertex, and records the vertex.
-  void note_vertex(const SampleKey<F>& key, uint32_t depth, const ShadedVertex<F>& at,
-                   const VertexAovs<F>& aovs) {
-    const VertexResult<F>& v = at.result;
-    add(aovs.emitter, v.emitted);
-    if (aovs.wants_events && (v.alive || v.has_shadow))
-      aovs_.expressions().scatter<F>(depth, kSlot, key, aovs, v.has_shadow, true);
-    aovs_.vertex<F>(depth, kSlot, aovs, at.path, true);
-    if (history_) history_.vertex<F>(depth, kSlot, at, radiance(), true);
-    aovs_.end_depth(depth, radiance(), 1);
-  }
-
-  /// Traces the shadow ray of a vertex, and adds its light sample. Returns whether the ray is free.
+  /// Traces the shadow ray of a vertex, and adds its light sample, whose light belongs to the light
+  /// group `group`. Returns whether the ray is free.
   bool trace_shadow(const SampleKey<F>& key, uint32_t depth, const VertexResult<F>& v,
-                    const VertexAovs<F>& aovs) {
+                    uint32_t group) {
     clock_.enter(Phase::kShadow);
     const bool links = context_.scene.lights.links.members != nullptr;
     const bool is_free = !rays_.occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth,
                                          links ? &v.shadow_set : nullptr);
-    if (is_free || max_component(v.shadow_tint) > 0.f)
-      add_direct(key, depth, v, is_free, aovs_.group_of<F>(aovs.light_id, true));
+    if (is_free || max_component(v.shadow_tint) > 0.f) add_direct(key, depth, v, is_free, group);
     return is_free;
   }
 
@@ -256,10 +248,7 @@ class PathTracer : PathRecorder {
                                               v.shadow_d, t);
     }
     if (!is_free) c = c * v.shadow_tint;
-    radiance_.sum += c;
-    if (aovs_.wants_lights()) aovs_.add_direct<F>(kSlot, group, c, true);
-    if (aovs_.wants_light_samples()) aovs_.add_light_sample<F>(kSlot, c, true);
-    if (history_) history_.light<F>(depth, kSlot, c, true);
+    events_.light<Technique::kLightSample, F>({depth, kSlot, c}, [&] { return group; }, true);
   }
 
   VertexResult<F> shade(const SampleKey<F>& key, uint32_t depth, const SingleHit& hit,
@@ -281,6 +270,7 @@ class PathTracer : PathRecorder {
 
   [[maybe_unused]] const Media& media_;
   PhaseClock& clock_;
+  PathHistory& history_;
   JointTransport::Buffers& buffers_;
   Joint joint_;
 };

@@ -9,7 +9,7 @@
 
 #include "wavecomb/accel/embree_accelerator.h"
 #include "wavecomb/aov/aov_tables.h"
-#include "wavecomb/aov/path_aovs.h"
+#include "wavecomb/aov/path_events.h"
 #include "wavecomb/core/settings.h"
 #include "wavecomb/film/film.h"
 #include "wavecomb/medium/nested/buffers.h"
@@ -135,6 +135,11 @@ struct Wave {
   PhaseClock clock;
   Counts counts;
   JointTransport::Buffers joint;
+
+  /// Returns the receiver of the events of the wave's camera paths.
+  PathEvents events(const WaveContext& context) {
+    return {context.scene, *context.camera, aovs, history, pool.radiance};
+  }
 
   size_t bytes() const {
     return pool.bytes() + aovs.bytes() + history.bytes() + rays.bytes() + hits.bytes() +

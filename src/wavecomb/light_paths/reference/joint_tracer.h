@@ -28,25 +28,22 @@ class LightJointTracer {
   }
 
   /// Connects the current vertex of the camera path to the stored vertex of the light path.
-  Color<F> use_vertex(uint32_t depth, SingleRays& rays) {
-    const Color<F> none(0.f);
-    if (!tracer_) return none;
+  void use_vertex(uint32_t depth, SingleRays& rays) {
+    if (!tracer_) return;
     const ConnectionTarget<F> target = connection_target();
-    if (!(max_component(target.row.light) > 0.f)) return none;
+    if (!(max_component(target.row.light) > 0.f)) return;
     worker_.clock.enter(Phase::kShade);
     const auto from = load_row<LightPathRow, F>(light_.vertices.paths, kOnlySlot, true);
     const VertexResult<F> v = shade(depth, rays, from, target);
-    if (!v.has_shadow) return none;
+    if (!v.has_shadow) return;
     worker_.clock.enter(Phase::kShadow);
     const uint32_t no_set = 0;
     const bool links = context_.scene.lights.links.members != nullptr;
     if (rays.occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth, links ? &no_set : nullptr))
-      return none;
-    PathAovs& aovs = worker_.aovs;
-    aovs.add_connection<F>(depth, kOnlySlot, from.light, v.direct, true);
-    if (light_.aovs.wants_events())
-      light_.aovs.connect<F>(aovs.expressions(), kOnlySlot, v.direct, true);
-    return v.direct;
+      return;
+    worker_.events(context_).light<Technique::kConnection, F>(
+        {depth, kOnlySlot, v.direct}, [&] { return from.light; }, true);
+    light_.aovs.connect<F>(worker_.aovs.expressions(), kOnlySlot, v.direct, true);
   }
 
   void end(size_t index) {

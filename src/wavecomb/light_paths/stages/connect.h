@@ -62,18 +62,16 @@ void connect(Wave& wave, const WaveContext& context, uint32_t depth) {
   wave.clock.enter(Phase::kShadow);
   fetch_shadows<F>(wave);
   occlude<F>(wave, context, depth, context.scene.lights.links.members != nullptr);
+  const PathEvents events = wave.events(context);
   for (size_t i = 0; i < q.size; i += kWidth<F>) {
     const Mask<F> active = first_lanes<F>(q.size - i) & Mask<F>(load<U>(q.occluded + i) == U(0u));
     const U slot = load<U>(q.slot + i);
     const Color<F> c{load<F>(q.r + i), load<F>(q.g + i), load<F>(q.b + i)};
-    add_radiance<F>(wave.pool.radiance, slot, c, active);
-    if (wave.aovs.wants_connections()) [[unlikely]] {
-      const auto light =
-          gather_field<F>(wave.joint.vertices.paths, &LightPathRow<float>::light, slot, active);
-      wave.aovs.add_connection<F>(depth, slot, light, c, active);
-      if (wave.joint.aovs.wants_events())
-        wave.joint.aovs.connect<F>(wave.aovs.expressions(), slot, c, active);
-    }
+    const auto light = [&] {
+      return gather_field<F>(wave.joint.vertices.paths, &LightPathRow<float>::light, slot, active);
+    };
+    events.light<Technique::kConnection, F>({depth, slot, c}, light, active);
+    wave.joint.aovs.connect<F>(wave.aovs.expressions(), slot, c, active);
   }
 }
 

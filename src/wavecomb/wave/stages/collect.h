@@ -3,7 +3,7 @@
 /// hit the shape of a light end in this stage.
 #pragma once
 
-#include "wavecomb/aov/screen_motion.h"
+#include "wavecomb/aov/path_events.h"
 #include "wavecomb/core/rows/rows.h"
 #include "wavecomb/geometry/hit/hit_material.h"
 #include "wavecomb/path/media.h"
@@ -15,41 +15,6 @@
 #include "wavecomb/wave/wave.h"
 
 namespace wavecomb {
-
-/// Returns the volume or mesh medium, and the material, of the volume event in each lane whose free
-/// flight stopped.
-template <typename F>
-VolumeHit<F> volume_hit(const Wave& wave, const WaveContext& context, const UInt<F>& slot,
-                        const Flight<F>& flight) {
-  using U = UInt<F>;
-  const SceneView& scene = context.scene;
-  VolumeHit<F> volume_event{flight.material - scene.volumes.first_material, U(0u), flight.material,
-                            Mask<F>(false)};
-  if (!context.has_medium_stack()) return volume_event;
-  volume_event.in_mesh =
-      flight.stopped & Mask<F>(flight.material == U(scene.nested_media.event_material));
-  const auto of_path = [&](auto member) {
-    return gather_field<F>(wave.pool.medium_stacks, member, slot, volume_event.in_mesh);
-  };
-  volume_event.object = of_path(&MediumStackRow<float>::object);
-  volume_event.material = select(Mask<U>(volume_event.in_mesh),
-                                 of_path(&MediumStackRow<float>::medium), volume_event.material);
-  return volume_event;
-}
-
-/// Records AOVs of ray segments through volumes and media: transmittance and scattering events.
-/// `throughput` is the path throughput at the end of the segment.
-template <typename F>
-void record_segment(Wave& wave, uint32_t depth, const UInt<F>& slot, const Flight<F>& flight,
-                    const Color<F>& throughput, const Mask<F>& active) {
-  if (depth == 0 && wave.aovs.wants_transmittance())
-    wave.aovs.pass<F>(
-        slot, select<F>(flight.stopped | flight.has_scattered, Color<F>(F(0.f)), throughput),
-        active);
-  const Mask<F> has_scattered = active & flight.has_scattered;
-  if (wave.aovs.expressions() && any(has_scattered))
-    wave.aovs.expressions().template walk<F>(slot, has_scattered);
-}
 
 /// Packet of rays from the ray queue, starting at index `i`, with the type of hit of each ray.
 template <typename F>
@@ -83,7 +48,8 @@ struct RayPacket {
 /// Adds the emission of volumes along the rays of a packet, and samples its free flights. Needs
 /// `p.path`.
 template <typename F, typename Media>
-WAVECOMB_INLINE Flight<F> fly_packet(Wave& wave, const ShadeSettings& settings, uint32_t depth,
+WAVECOMB_INLINE Flight<F> fly_packet(Wave& wave, const PathEvents& events,
+                                     const ShadeSettings& settings, uint32_t depth,
                                      const Media& media, RayPacket<F>& p) {
   if constexpr (Media::kHasEmission)
     if (media.has_emission()) {
@@ -95,8 +61,8 @@ WAVECOMB_INLINE Flight<F> fly_packet(Wave& wave, const ShadeSettings& settings, 
                            {settings.sampler, p.path.key, depth, p.o, p.d, p.t, when}, p.active),
                    clamp_limit(settings, depth));
       const Mask<F> bright = p.active & not_(is_black(c));
-      add_radiance<F>(wave.pool.radiance, p.slot, c, bright);
-      if (wave.aovs.wants_lights()) wave.aovs.add_volume_emission<F>(p.slot, c, bright);
+      events.light<Technique::kVolume, F>(
+          {depth, p.slot, c}, [] { return UInt<F>(kNoLight); }, bright);
     }
   Flight<F> flight;
   if constexpr (Media::kStreams)
@@ -109,7 +75,7 @@ WAVECOMB_INLINE Flight<F> fly_packet(Wave& wave, const ShadeSettings& settings, 
   p.path.throughput = p.path.throughput * flight.weight;
   store_row<PathRow, F>(wave.pool.paths, p.slot, p.path, p.active);
   const Mask<F> through = not_(flight.stopped);
-  record_segment<F>(wave, depth, p.slot, flight, p.path.throughput, p.active);
+  events.segment<F>(depth, p.slot, flight, p.path.throughput, p.active);
   p.missed = p.missed & through;
   p.shape = p.shape & through;
   p.surface = p.surface & through;
@@ -134,52 +100,25 @@ WAVECOMB_INLINE void load_arrival(const Wave& wave, const WaveContext& context, 
 
 /// Adds the light of the paths that leave the scene or hit the shape of a light.
 template <typename F>
-WAVECOMB_INLINE void add_ended(Wave& wave, const WaveContext& context,
+WAVECOMB_INLINE void add_ended(const Wave& wave, const PathEvents& events, const SceneView& scene,
                                const ShadeSettings& settings, uint32_t depth,
                                const RayPacket<F>& p) {
-  using U = UInt<F>;
-  const Mask<F> ended = p.missed | p.shape;
-  if (none(ended)) return;
-  const SceneView& scene = context.scene;
-  const uint32_t* const geom = wave.hits.geom + p.i;
-  Color<F> c(F(0.f));
-  const bool is_lit = any(p.missed) && settings.adds_environment(depth);
-  if (is_lit)
-    c = select<F>(p.missed, environment_emission<F>(scene, settings, depth, p.state, p.missed), c);
-  if (any(p.shape)) {
-    const U light = load<U>(geom);
-    c = select<F>(p.shape, shape_emission<F>(scene, settings, depth, light, p.t, p.state, p.shape),
-                  c);
-  }
-  add_radiance<F>(wave.pool.radiance, p.slot, c, ended & not_(is_black(c)));
-  if (wave.aovs.wants_lights()) {
-    if (is_lit) wave.aovs.add_environment<F>(scene, settings, depth, p.slot, p.state, p.missed);
-    if (any(p.shape)) wave.aovs.add_light<F>(p.slot, load<U>(geom), c, p.shape);
-  }
-}
-
-/// Returns the shutter times of a packet of camera rays, or 0 if the camera does not move.
-template <typename F>
-WAVECOMB_INLINE F shutter_time(const Wave& wave, const WaveContext& context,
-                               const RayPacket<F>& p) {
-  return context.camera->moves()
-             ? gather_field<F>(wave.pool.cold, &PathColdRow<float>::time, p.slot, p.active)
-             : F(0.f);
-}
-
-/// Records AOVs of camera rays that hit the shape of a light.
-template <typename F>
-WAVECOMB_INLINE void note_shapes(Wave& wave, const WaveContext& context, const RayPacket<F>& p) {
-  using U = UInt<F>;
+  if (any(p.missed)) events.environment<F>(settings, depth, p.slot, p.state, p.missed);
   if (none(p.shape)) return;
-  const U light = load<U>(wave.hits.geom + p.i);
-  wave.aovs.hit_light<F>(*context.camera, p.slot, p.end(), shutter_time<F>(wave, context, p), light,
-                         p.shape);
-  if (wave.aovs.wants_motion()) [[unlikely]]
-    wave.aovs.move<F>(p.slot,
-                      screen_motion_of_light<F>(context.scene.lights, *context.camera, light,
-                                                p.end(), p.state.time, p.shape),
-                      p.shape);
+  const UInt<F> light = load<UInt<F>>(wave.hits.geom + p.i);
+  const Color<F> c = shape_emission<F>(scene, settings, depth, light, p.t, p.state, p.shape);
+  events.light<Technique::kEmitter, F>(
+      {depth, p.slot, c}, [&] { return light; }, p.shape & not_(is_black(c)));
+}
+
+/// Returns the ends of a packet of camera rays. The shutter times are 0 if nothing moves.
+template <typename F>
+WAVECOMB_INLINE RayEnd<F> ray_end(const Wave& wave, const WaveContext& context,
+                                  const RayPacket<F>& p) {
+  const F time = context.moves()
+                     ? gather_field<F>(wave.pool.cold, &PathColdRow<float>::time, p.slot, p.active)
+                     : F(0.f);
+  return {p.slot, p.end(), time};
 }
 
 /// Ids of the surfaces that the rays of a packet hit. Values are undefined in lanes whose ray hit
@@ -216,20 +155,25 @@ WAVECOMB_INLINE UInt<F> surface_material(const Wave& wave, const SceneView& scen
   return material;
 }
 
-/// Records AOVs of camera rays that hit surfaces.
+/// Reports the camera rays that volumes or media stop.
 template <typename F>
-WAVECOMB_INLINE void note_surfaces(Wave& wave, const WaveContext& context, const RayPacket<F>& p,
+WAVECOMB_INLINE void note_volumes(const PathEvents& events, const SceneView& scene,
+                                  const PathPool& pool, const RayEnd<F>& end,
+                                  const Flight<F>& flight) {
+  const VolumeHit<F> hit =
+      volume_hit<F>(scene, pool.medium_stacks, end.slot, flight.material, flight.stopped);
+  events.hit_volume<F>(end, hit, flight.stopped);
+}
+
+/// Reports the first hits of camera rays on surfaces.
+template <typename F>
+WAVECOMB_INLINE void note_surfaces(const PathEvents& events, const HitBuffer& hits,
+                                   const RayEnd<F>& end, const RayPacket<F>& p,
                                    const HitIds<F>& ids, const UInt<F>& material) {
-  wave.aovs.hit_surface<F>(*context.camera, p.slot, p.end(), shutter_time<F>(wave, context, p),
-                           {.inst = p.inst, .geom = ids.geom, .material = material}, p.surface);
-  if (wave.aovs.wants_motion()) [[unlikely]]
-    wave.aovs.move<F>(
-        p.slot,
-        screen_motion_of_hit<F>(context.scene, *context.camera,
-                                {p.inst, ids.mesh, ids.prim, load<F>(wave.hits.u + p.i),
-                                 load<F>(wave.hits.v + p.i), F(0.f)},
-                                p.d, p.surface),
-        p.surface);
+  events.hit_surface<F>(
+      end, p.d, {.inst = p.inst, .geom = ids.geom, .material = material},
+      {p.inst, ids.mesh, ids.prim, load<F>(hits.u + p.i), load<F>(hits.v + p.i), F(0.f)},
+      p.surface);
 }
 
 /// Reads the ray queue and the hit buffer, and fills the shading queue in the order of the rays. If
@@ -245,7 +189,8 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
   const SceneView& scene = context.scene;
   const bool cost_aware = settings.cost_aware && depth >= settings.roulette_depth;
   const bool is_first = !kOfJoint && depth == 0;
-  const bool records_hits = is_first && wave.aovs.wants_hits();
+  const PathEvents events = wave.events(context);
+  const bool records_hits = is_first && events.wants_hits();
   queue.clear();
   size_t n = 0;
   for (size_t i = 0; i < wave.rays.size; i += kWidth<F>) {
@@ -255,28 +200,27 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
     [[maybe_unused]] Flight<F> flight;
     if (any(wanted)) {
       p.path = load_row<PathRow, F>(wave.pool.paths, p.slot, wanted);
-      if constexpr (Media::kAny) flight = fly_packet<F>(wave, settings, depth, media, p);
+      if constexpr (Media::kAny) flight = fly_packet<F>(wave, events, settings, depth, media, p);
       load_arrival<F>(wave, context, depth, wanted, p);
     }
-    if (!kOfJoint) add_ended<F>(wave, context, settings, depth, p);
+    if (!kOfJoint) add_ended<F>(wave, events, scene, settings, depth, p);
     if (is_first && context.joint.is_active()) [[unlikely]]
       wave.joint.template begin_ratios<F>(context.joint, *context.camera, p.slot,
-                                          {p.end(), p.d, shutter_time<F>(wave, context, p)},
+                                          {p.end(), p.d, ray_end<F>(wave, context, p).time},
                                           p.surface);
     if (is_first && scene.visibility) [[unlikely]]
       p.surface = p.surface & not_(is_holdout<F>(scene, p.inst, load<U>(hits.geom + i), p.surface));
-    if (records_hits) note_shapes<F>(wave, context, p);
+    if (records_hits && any(p.shape))
+      events.hit_light<F>(ray_end<F>(wave, context, p), load<U>(hits.geom + i), p.shape);
     const auto recorded = [&] {
       if constexpr (Media::kAny)
         return Mask<F>(p.surface | flight.stopped);
       else
         return p.surface;
     };
-    if (is_first && wave.aovs.wants_alpha()) wave.aovs.cover<F>(p.slot, p.shape | recorded());
     if constexpr (Media::kAny)
       if (records_hits)
-        wave.aovs.hit_volume<F>(*context.camera, p.slot, p.end(), shutter_time<F>(wave, context, p),
-                                volume_hit<F>(wave, context, p.slot, flight), flight.stopped);
+        note_volumes<F>(events, scene, wave.pool, ray_end<F>(wave, context, p), flight);
     if (none(recorded())) continue;
 
     const HitIds<F> ids(scene, hits, p);
@@ -284,11 +228,12 @@ void collect(Wave& wave, const WaveContext& context, const ShadeSettings& settin
     if constexpr (Media::kAny)
       material = select(Mask<U>(flight.stopped), flight.material, material);
     const U program = gather<U>(scene.material_variant, material, Mask<U>(recorded()));
-    if (records_hits) note_surfaces<F>(wave, context, p, ids, material);
+    if (records_hits)
+      note_surfaces<F>(events, hits, ray_end<F>(wave, context, p), p, ids, material);
     if (cost_aware) {
       const F q =
           cost_aware_survival<F>(scene, *context.roulette_costs, material, p.state, p.surface);
-      if (!kOfJoint) wave.aovs.survive<F>(depth, p.slot, q, p.surface);
+      if (!kOfJoint) events.survive<F>(depth, p.slot, q, p.surface);
       p.surface = p.surface & (cost_aware_number<F>(p.path.key, depth) < q);
       p.path.throughput *= F(1.f) / q;
       if (none(recorded())) continue;

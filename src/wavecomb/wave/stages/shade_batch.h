@@ -41,37 +41,17 @@ WAVECOMB_INLINE PathState<F> load_state(const PathPool& pool, const WaveContext&
   return state;
 }
 
-/// Adds the emission at the vertices of a packet to the radiance of their paths. Returns the light
-/// group of each light sample, or 0 if the render has no light group AOVs.
-template <typename F, uint32_t kFeatures>
-WAVECOMB_INLINE UInt<F> add_emitted(Wave& wave, const VertexResult<F>& v, const SampleKey<F>& key,
-                                    const UInt<F>& slot, uint32_t depth, const VertexAovs<F>& aovs,
-                                    const Mask<F>& active) {
-  using V = Vertex<F, kFeatures>;
-  const Mask<F> emits = active & not_(is_black(v.emitted));
-  if (any(emits)) add_radiance<F>(wave.pool.radiance, slot, v.emitted, emits);
-  UInt<F> light_id(0u);
-  if (V::has(kRecordsAovs) && aovs.wants_lights) {
-    wave.aovs.template add_light<F>(slot, aovs.emitter, v.emitted, emits);
-    light_id = wave.aovs.template group_of<F>(aovs.light_id, v.has_shadow);
-    if (aovs.wants_events)
-      wave.aovs.expressions().template scatter<F>(depth, slot, key, aovs, v.has_shadow,
-                                                  Mask<F>(v.alive | v.has_shadow));
-  }
-  return light_id;
-}
-
-/// Stores the shadow rays and the next path segments of a packet. `light_id` is the light group of
-/// the light samples.
+/// Stores the shadow rays and the next path segments of a packet. `group` is the light group of the
+/// light samples.
 template <typename Bsdf, typename F, uint32_t kFeatures>
 WAVECOMB_INLINE void store_rays(const PathPool& pool, const VertexResult<F>& v,
                                 const SampleKey<F>& key, const UInt<F>& slot,
-                                const UInt<F>& light_id) {
+                                const UInt<F>& group) {
   using V = Vertex<F, kFeatures>;
   if (any(v.has_shadow))
-    store_row<ShadowRow, F>(
-        pool.shadows, slot,
-        {v.shadow_o, v.shadow_d, v.shadow_tfar, v.direct, light_id, v.shadow_set}, v.has_shadow);
+    store_row<ShadowRow, F>(pool.shadows, slot,
+                            {v.shadow_o, v.shadow_d, v.shadow_tfar, v.direct, group, v.shadow_set},
+                            v.has_shadow);
   if constexpr (V::has(kMeshLights)) {
     if (pool.shadow_tints) [[unlikely]]
       store_row<RadianceRow, F>(pool.shadow_tints, slot, {v.shadow_tint}, v.has_shadow);
@@ -96,7 +76,7 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
   VertexAovs<F> aovs = wave.aovs.template wanted<F>(depth);
   using V = Vertex<F, kFeatures>;
   const bool wants_aovs = V::has(kRecordsAovs) && wave.aovs.wants_vertex(depth);
-  const bool is_watched = wants_aovs || (V::has(kRecordsAovs) && wave.history);
+  const PathEvents events = wave.events(context);
   const bool links = V::has(kLinks) && context.links();
   for (size_t i = begin; i < end; i += kWidth<F>) {
     const RecordPacket<F> packet(queue, i, end);
@@ -126,16 +106,11 @@ void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& se
     const VertexResult<F> v = shade_one<Bsdf, Joint>(vertex, joint);
     joint.store(slot, v.next, v.alive, wave.aovs, active);
 
-    const U light_id = add_emitted<F, kFeatures>(wave, v, path.key, slot, depth, aovs, active);
-    if (is_watched) {
-      if (wants_aovs) wave.aovs.template vertex<F>(depth, slot, aovs, state, active);
-      if (wave.history)
-        wave.history.template vertex<F>(depth, slot,
-                                        {.path = state, .t = t, .material = material, .result = v},
-                                        pool.radiance, active);
-    }
+    const ShadedVertex<F> shaded{.path = state, .t = t, .material = material, .result = v};
+    const U group =
+        events.vertex<V::has(kRecordsAovs), F>({depth, slot, path.key, shaded, aovs}, active);
     packet.store(queue, v.alive, v.next.dir, v.has_shadow, v.shadow_d);
-    store_rays<Bsdf, F, kFeatures>(pool, v, path.key, slot, light_id);
+    store_rays<Bsdf, F, kFeatures>(pool, v, path.key, slot, group);
     if (V::has(kNestedMedia) && pool.medium_stacks) [[unlikely]]
       scatter_field<F>(pool.medium_stacks, &MediumStackRow<float>::crossed, slot, v.crossed,
                        active);

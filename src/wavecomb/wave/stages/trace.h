@@ -107,8 +107,7 @@ void shadow(Wave& wave, const WaveContext& context, uint32_t depth,
   occlude<F>(wave, context, depth, context.scene.lights.links.members != nullptr);
   if constexpr (Media::kStreams)
     media.template attenuate_shadow_rays<F>(wave, depth, context.settings->sampler);
-  const bool is_watched =
-      wave.aovs.wants_lights() || wave.aovs.wants_light_samples() || wave.history;
+  const PathEvents events = wave.events(context);
   for (size_t i = 0; i < q.size; i += kWidth<F>) {
     Mask<F> active = first_lanes<F>(q.size - i) & Mask<F>(load<U>(q.occluded + i) == U(0u));
     const U slot = load<U>(q.slot + i);
@@ -133,15 +132,10 @@ void shadow(Wave& wave, const WaveContext& context, uint32_t depth,
       c = select<F>(blocked, c * tint, c);
       active = active | (blocked & (max_component(tint) > 0.f));
     }
-    add_radiance<F>(wave.pool.radiance, slot, c, active);
-    if (is_watched) {
-      if (wave.aovs.wants_lights())
-        wave.aovs.add_direct<F>(
-            slot, gather_field<F>(wave.pool.shadows, &ShadowRow<float>::group, slot, active), c,
-            active);
-      if (wave.aovs.wants_light_samples()) wave.aovs.add_light_sample<F>(slot, c, active);
-      if (wave.history) wave.history.light<F>(depth, slot, c, active);
-    }
+    const auto group = [&] {
+      return gather_field<F>(wave.pool.shadows, &ShadowRow<float>::group, slot, active);
+    };
+    events.light<Technique::kLightSample, F>({depth, slot, c}, group, active);
   }
 }
 
