@@ -189,9 +189,12 @@ nb::list aov_table() {
                                            "coverage", "groups",       "expressions",
                                            "sum",      "deep",         "median"};
   static_assert(std::size(kKinds) == static_cast<size_t>(AovKind::kMedian) + 1);
-  static constexpr const char* kContents[] = {"light", "colour", "direction",
-                                              "id",    "exact",  "value"};
-  static_assert(std::size(kContents) == static_cast<size_t>(AovContent::kValue) + 1);
+  static constexpr const char* kContents[] = {"light", "colour", "direction", "id",
+                                              "exact", "value",  "magnitude"};
+  static_assert(std::size(kContents) == static_cast<size_t>(AovContent::kMagnitude) + 1);
+  static constexpr const char* kSources[] = {"hit",       "vertex", "guide", "light",
+                                             "technique", "time",   "bounce"};
+  static_assert(std::size(kSources) == static_cast<size_t>(AovSource::kBounce) + 1);
   nb::list rows;
   for (const AovRow& aov : kAovs) {
     // Skip light path expressions, which are requested by their text, and deep images, which are
@@ -203,6 +206,7 @@ nb::list aov_table() {
     row["letters"] = aov.letters;
     row["content"] = kContents[static_cast<size_t>(aov.content)];
     row["kind"] = kKinds[static_cast<size_t>(aov.kind)];
+    row["source"] = kSources[static_cast<size_t>(aov.source)];
     row["title"] = aov.title;
     rows.append(row);
   }

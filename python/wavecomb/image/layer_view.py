@@ -77,16 +77,6 @@ Develop = Callable[[NDArray[Any]], NDArray[np.uint8]]
 """Converts linear Rec.709 (height, width, 3) to 8-bit sRGB values."""
 
 _CRYPTO = ("crypto_", "Crypto")
-_UNITS = {
-    "cost": "cost, ns per pixel",
-    "samples": "samples per pixel",
-    "error": "error of the pixel",
-    "variance": "variance, luminance",
-    "depth": "depth, scene units",
-    "half_depth": "depth to half opacity, scene units",
-}
-"""Titles of legends with units; other layers have the title of their AOV."""
-_LOGARITHMIC = ("cost", "error", "variance")
 NOT_FINITE = (0, 255, 255)
 
 
@@ -186,16 +176,17 @@ def show_layer(
 
 def has_false_colours(name: str) -> bool:
     """Returns whether a layer has one number per pixel and is displayed in false colours."""
-    row = aovs.core_aovs().get(name)
+    row = aovs.row_of(name)
     if row is None:
-        return name in ("samples", *aovs.ERRORS)
-    return row.channels == 1 and row.content in ("value", "exact")
+        return False
+    # The luminance of a variance is displayed.
+    return row.content == "magnitude" or (row.channels == 1 and row.content in ("value", "exact"))
 
 
 def _legend_title(name: str) -> str:
     """Returns the title of a legend, from the name of a layer or another title."""
-    row = aovs.core_aovs().get(name)
-    return _UNITS.get(name) or (row.title if row else "") or name
+    row = aovs.row_of(name)
+    return (row.title if row else "") or name
 
 
 def heat(
@@ -214,7 +205,7 @@ def heat(
     """
     wide = np.asarray(values, np.float64)
     finite = np.isfinite(wide)
-    logarithmic = name in _LOGARITHMIC
+    logarithmic = aovs.content(name) == "magnitude"
     usable = wide[finite & (wide > 0.0)] if logarithmic else wide[finite]
     if usable.size == 0:
         usable = np.array([1.0])

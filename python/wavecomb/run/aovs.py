@@ -22,8 +22,6 @@ DEEP = "deep"
 """AOV of the deep image, which the option ``--deep`` writes to a separate file, not to a layer.
 """
 LIGHT = "light_"
-TECHNIQUES = ("by_bounces", "by_light_samples", "by_light_paths")
-"""AOVs with the contributions of each light transport technique. Their sum is the beauty."""
 
 
 @dataclass(frozen=True)
@@ -37,9 +35,12 @@ class Aov:
         letters: Letters of the channel names in files, such as "XYZ". "" means that channels are
             numbered or that there is one channel.
         content: Meaning of the AOV's values: "light", "colour", "direction", "id", "exact" (values
-            that lossy compression would make useless) or "value".
+            that lossy compression would make useless), "magnitude" (a logarithmic scale displays
+            it best) or "value".
         kind: How the samples of a pixel are combined: "mean", "mean_of_hits", "nearest",
             "coverage", "groups", "sum" or "median".
+        source: What changes the value: "hit", "vertex", "guide", "light", "technique" (light that
+            some techniques have found), "time" or "bounce".
         title: Title of the layer in the window; "" if the window does not offer it.
     """
 
@@ -48,6 +49,7 @@ class Aov:
     letters: str
     content: str
     kind: str
+    source: str
     title: str
 
 
@@ -64,12 +66,22 @@ def core_aovs() -> Mapping[str, Aov]:
 
 
 _OTHERS = {
-    "beauty": ("RGB", "light"),
-    "denoised": ("RGB", "light"),
-    "unbiased": ("RGB", "light"),
-    "variance": ("RGB", "value"),
+    row.name: row
+    for row in (
+        Aov("beauty", 3, "RGB", "light", "mean", "light", "Beauty"),
+        Aov("denoised", 3, "RGB", "light", "mean", "light", "Denoised"),
+        Aov("unbiased", 3, "RGB", "light", "mean", "light", "Unbiased"),
+        Aov("samples", 1, "", "value", "sum", "time", "Samples per pixel"),
+        Aov("error", 1, "", "magnitude", "mean", "light", "Error of the pixel"),
+        Aov("variance", 3, "RGB", "magnitude", "mean", "light", "Variance, luminance"),
+    )
 }
-"""Channel letters and content of the layers that are not AOVs."""
+"""Layers that are not AOVs of the core."""
+
+
+def row_of(layer: str) -> Aov | None:
+    """Returns the row that describes a layer, or None for layers of lights and expressions."""
+    return _OTHERS.get(layer) or core_aovs().get(layer)
 
 
 def letters(layer: str) -> str:
@@ -80,9 +92,7 @@ def letters(layer: str) -> str:
     >>> letters("normal")
     'XYZ'
     """
-    if layer in _OTHERS:
-        return _OTHERS[layer][0]
-    row = core_aovs().get(layer)
+    row = row_of(layer)
     return row.letters if row else ""
 
 
@@ -92,9 +102,7 @@ def content(layer: str) -> str:
     >>> content("by_bounces"), content("position")
     ('light', 'exact')
     """
-    if layer in _OTHERS:
-        return _OTHERS[layer][1]
-    row = core_aovs().get(layer)
+    row = row_of(layer)
     if row:
         return row.content
     return "light" if layer.startswith((LIGHT, "lpe_")) else "value"
@@ -118,6 +126,16 @@ def of_kind(kind: str) -> tuple[str, ...]:
 
 
 @cache
+def techniques() -> tuple[str, ...]:
+    """Returns the names of the AOVs with the light that some techniques have found.
+
+    >>> techniques()
+    ('by_bounces', 'by_light_samples', 'by_light_paths')
+    """
+    return tuple(name for name, row in core_aovs().items() if row.source == "technique")
+
+
+@cache
 def names() -> tuple[str, ...]:
     """Returns the names of all AOVs.
 
@@ -131,7 +149,7 @@ def names() -> tuple[str, ...]:
 
 def groups() -> dict[str, tuple[str, ...]]:
     """Returns the names that stand for several AOVs, with these AOVs."""
-    return {"all": names(), "crypto": of_kind("coverage"), "techniques": TECHNIQUES}
+    return {"all": names(), "crypto": of_kind("coverage"), "techniques": techniques()}
 
 
 def expand(asked: Iterable[str]) -> tuple[str, ...]:

@@ -41,9 +41,9 @@ _ZOOMS = ("Fit", "50 %", "100 %", "200 %", "400 %", "800 %", "1600 %")
 @cache
 def _titles() -> dict[str, str]:
     """Returns the titles of the layers that the layer box offers, in order."""
-    own = {name: row.title for name, row in aov_names.core_aovs().items() if row.title}
-    last = {"samples": "Samples", "error": "Error", "variance": "Variance"}
-    return {"beauty": "Beauty", "denoised": "Denoised", **own, **last}
+    names = ("beauty", "denoised", *aov_names.core_aovs(), "samples", *aov_names.ERRORS)
+    rows = {name: aov_names.row_of(name) for name in names}
+    return {name: row.title for name, row in rows.items() if row and row.title}
 
 
 def _title(layer: str) -> str:
