@@ -31,13 +31,13 @@ enum class AovKind : uint8_t {
 
 /// Point in the evaluation of a path at which the value of an AOV is known.
 enum class AovSource : uint8_t {
-  kHit,     ///< The value is known at the hit of the camera ray, before shading.
-  kVertex,  ///< The value is known after the first vertex has been shaded.
-  kGuide,   ///< The value is known after the last vertex that provides denoiser features.
-  kLight,   ///< The value changes whenever light contributes to the path.
+  kHit,        ///< The value is known at the hit of the camera ray, before shading.
+  kVertex,     ///< The value is known after the first vertex has been shaded.
+  kGuide,      ///< The value is known after the last vertex that provides denoiser features.
+  kLight,      ///< The value changes whenever light contributes to the path.
   kTechnique,  ///< The value is the light that some techniques have found, such as light samples.
-  kTime,    ///< The value is a time measured with the clock.
-  kBounce,  ///< The value accumulates over all bounces of the path.
+  kTime,       ///< The value is a time measured with the clock.
+  kBounce,     ///< The value accumulates over all bounces of the path.
 };
 
 /// Meaning of the numbers in a layer. It determines how image files store the layer and how the
