@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import compileall
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Generator
@@ -27,7 +28,12 @@ if os.environ.pop("PYTHONDONTWRITEBYTECODE", None):
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Compile the package once, before workers start."""
+    """Compile the package once, before workers start, and let SIGINT stop child processes.
+
+    A shell that runs the tests in the background ignores SIGINT, and child processes inherit that.
+    """
+    if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     if not hasattr(config, "workerinput"):
         compileall.compile_dir(parts.PACKAGE, quiet=2)
 

@@ -116,11 +116,9 @@ def _check_range(name: str, value: Any) -> None:
         return
     if row.least is None or row.most is None:
         return
-    # The table rounds numbers above 2^24, of which integers have only the limit 2^32 - 1.
-    most = 2**32 - 1 if row.kind == "integer" and row.most > 2**24 else row.most
-    if row.least <= value <= most:
+    if row.least <= value <= row.most:
         return
-    limits = f"from {row.least:.12g} to {most:.12g}"
+    limits = f"from {row.least:.12g} to {row.most:.12g}"
     example = _EXAMPLES.get(name, f"{name}={row.default if row.default is not None else 1!r}")
     raise _wrong(name, value, limits, example)
 

@@ -24,11 +24,14 @@ def rows_by_name(row: type[R], given: Iterable[Mapping[str, Any]]) -> Mapping[st
     Args:
         row: Class of a row.
         given: Result of ``_core.setting_table()`` or a similar function. Float32 values of the
-            table become the shortest decimal numbers that represent them, such as 0.53.
+            table become the shortest decimal numbers that represent them, such as 0.53. Whole
+            numbers stay exact.
     """
 
     def plain(value: Any) -> Any:
-        return float(f"{value:.7g}") if isinstance(value, float) else value
+        if not isinstance(value, float) or (value.is_integer() and abs(value) < 2**53):
+            return value
+        return float(f"{value:.7g}")
 
     made = [row(**{key: plain(value) for key, value in one.items()}) for one in given]
     return MappingProxyType({one.name: one for one in made})

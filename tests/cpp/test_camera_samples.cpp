@@ -227,7 +227,8 @@ TEST(CameraConnections, GoRoundAPictureOfAllDirections) {
   const Film film(all, {}, false);
   Random random(5);
   for (int i = 0; i < 300; ++i) {
-    // Tests points near the edges. Camera samples of pixels at an edge may lie beyond the edge.
+    // Tests points near the edges of the image. Camera samples of pixels at an edge may lie beyond
+    // the edge.
     const float x = 4 * random() - 2 + (i % 2 ? kAcross : 0);
     const float y = i % 3 == 0 ? 4 * random() - 2 + (i % 2 ? kDown : 0) : kDown * random();
     const CameraRay<float> ray = ray_through<float>(setup, x, y, 0.f, 0.f, 0.f, true);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "wavecomb/aov/path_aovs.h"
+#include "wavecomb/film/film.h"
 #include "wavecomb/path/path_pool.h"
 
 #include <algorithm>
@@ -149,12 +150,35 @@ TEST(PathAovs, OnlyWhatIsAskedForTakesRoom) {
   EXPECT_FALSE(all.wanted<float>(1).wants_uv);
 }
 
+TEST(PathAovs, TechniquesKeepApart) {
+  const uint32_t slot = 2;
+  const PathAovs none(8, {AovSet{}}, nullptr);
+  EXPECT_FALSE(none.wants(Technique::kEmitter) || none.wants(Technique::kVolume) ||
+               none.wants(Technique::kLightSample) || none.wants(Technique::kConnection));
+  const PathAovs aovs(8, {AovSet{static_cast<uint32_t>(Aov::kByBounces)}}, nullptr);
+  EXPECT_FALSE(aovs.wants(Technique::kEmitter) || aovs.wants(Technique::kVolume));
+  EXPECT_TRUE(aovs.wants(Technique::kLightSample) && aovs.wants(Technique::kConnection));
+  aovs.light<Technique::kEmitter, float>({0, slot, {4.f, 4.f, 4.f}}, kNoLight, true);
+  aovs.light<Technique::kLightSample, float>({0, slot, {1.f, 2.f, 3.f}}, kNoGroup, true);
+  aovs.light<Technique::kConnection, float>({1, slot, {1.f, 1.f, 1.f}}, 0, true);
+  Film film(1, 1, {AovSet{static_cast<uint32_t>(Aov::kByBounces)}});
+  const RadianceRow<float> radiance[3] = {{}, {}, {{6.f, 7.f, 8.f}}};
+  aovs.resolve(film.aovs(), 0, 2, 3, &radiance[0].sum.x);
+  const double* by_bounces = film.aovs().sums(Aov::kByBounces, 0);
+  EXPECT_EQ(by_bounces[0], 4.0);
+  EXPECT_EQ(by_bounces[1], 4.0);
+  EXPECT_EQ(by_bounces[2], 4.0);
+}
+
 TEST(PathAovs, LightGroupsKeepApart) {
   const PathAovs aovs(8, {AovSet{static_cast<uint32_t>(Aov::kLightGroups)}, 3}, nullptr);
-  aovs.add<float>(2, 1, {1.f, 2.f, 3.f}, true);
-  aovs.add<float>(2, 1, {1.f, 0.f, 0.f}, true);
-  aovs.add<float>(2, kNoGroup, {9.f, 9.f, 9.f}, true);
-  aovs.add<float>(3, 0, {9.f, 9.f, 9.f}, false);
+  const auto add = [&](uint32_t slot, uint32_t group, const Color<float>& c, bool active) {
+    aovs.light<Technique::kLightSample, float>({0, slot, c}, group, active);
+  };
+  add(2, 1, {1.f, 2.f, 3.f}, true);
+  add(2, 1, {1.f, 0.f, 0.f}, true);
+  add(2, kNoGroup, {9.f, 9.f, 9.f}, true);
+  add(3, 0, {9.f, 9.f, 9.f}, false);
   for (uint32_t row = 0; row < 8 * 3; ++row) {
     const Color<float> sum = load_row<RadianceRow, float>(aovs.group_rows(), row, true).sum;
     const bool lit = row == 2 * 3 + 1;

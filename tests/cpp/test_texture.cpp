@@ -50,8 +50,8 @@ TEST(Half, RoundsToNearestEven) {
       continue;
     }
     ASSERT_EQ(float_to_half(x), half);
-    // Conversion to half precision rounds ties to even; values on either side of a tie are
-    // unambiguous.
+    // A value halfway between two half-precision numbers is rounded to the even one. The values
+    // next to it are rounded to the nearest.
     const double next = half_value(static_cast<uint16_t>(h + 1));
     if ((h & 0x7fff) >= 0x7bff || !std::isfinite(next)) continue;
     const auto middle = static_cast<float>((static_cast<double>(x) + next) / 2);
@@ -413,7 +413,7 @@ TEST(Lookup, AgreesWithTheReferenceInAllFormatsAndWraps) {
 }
 
 TEST(Lookup, FinestLevelAloneGivesTheSameBits) {
-  // Packets without lanes of coarse footprints take a fast path; packets with one do not.
+  // Lookups take a fast path unless a lane of the packet has a coarse footprint.
   Image image = make_image(64, 32, 4, TexelFormat::kU8, true);
   const Texture texture = make_texture(image);
   const auto s = padded({}, 512, -1.f, 2.f, 31), t = padded({}, 512, -1.f, 2.f, 32);

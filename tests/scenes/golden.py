@@ -130,7 +130,7 @@ class Verdict:
 
     @property
     def good(self) -> bool:
-        """Whether pixels, blocks and the image mean all pass."""
+        """Whether the tests of pixels, of blocks and of the image's mean all pass."""
         from scipy import stats
 
         limit = stats.norm.isf(MEAN_SIGNIFICANCE / 6.0)

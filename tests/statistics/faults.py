@@ -86,7 +86,7 @@ FAULTS = (
         12,
         (
             (
-                CORE + "render/renderer.cpp",
+                CORE + "render/pilots/planner.cpp",
                 "if (used.max_depth == 0) used.transport = Transport::kPath;",
                 "",
             ),

@@ -94,7 +94,7 @@ def _names(context: click.Context, parameter: click.Parameter, begun: str) -> li
     ),
     option(
         "--shader-cost X", Real(1),
-        "Octaves of noise on the most expensive material of scene spread; 1 means none.  "
+        "Octaves of noise on the most expensive material of the scene `spread`; 1 means no noise.  "
         "[default: 1]",
     ),
     option(

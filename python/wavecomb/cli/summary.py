@@ -162,7 +162,7 @@ def _sampling_lines(stats: Mapping[str, Any]) -> list[str]:
 
 
 def _why_not_guided(stats: Mapping[str, Any]) -> str:
-    """Returns why ``--guiding auto`` did not measure a gain."""
+    """Returns the reason for which ``--guiding auto`` has not measured its gain."""
     transport = stats.get("transport") or {}
     given = stats["settings"].get("transport")
     if transport.get("chosen") == "light" or given in ("light", "bdpt"):

@@ -17,7 +17,8 @@ namespace wavecomb {
 
 struct EmbreeDevice;
 
-/// Embree geometries of meshes, scenes of groups, and the top-level scene with light shapes.
+/// Embree objects of a scene: a geometry for each mesh, an Embree scene for each group, and the
+/// top-level Embree scene, which also contains the shapes of lights.
 ///
 /// Contract: the object is immutable and keeps the mesh arrays alive. Materials affect it only in
 /// the choice of meshes whose hits are filtered. The filter reads the materials of the scene in

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Events of camera paths. Waves and the reference integrator call the functions of `PathEvents`
-/// for each event of a path: its first hit, its ray segments through media, its vertices, and each
-/// contribution of light. The functions add to the radiance of the path, to its AOVs and to the
-/// stored vertices from which the guiding field learns.
+/// for each event of a path: its start, its first hit, its ray segments through media, its
+/// vertices, and each contribution of light. The functions add to the radiance of the path, to its
+/// AOVs and to the stored vertices from which the guiding field learns.
 #pragma once
 
 #include "wavecomb/aov/path_aovs.h"
@@ -62,6 +62,13 @@ class PathEvents {
       : scene_(scene), camera_(camera), aovs_(aovs), history_(history), radiance_(radiance) {}
 
   // ---- before the first vertex ------------------------------------------------------------------
+
+  /// Records the start of camera rays. `r` contains the sample values with which the rays were
+  /// generated.
+  template <typename F>
+  void begin(const Sample4<F>& r, const UInt<F>& slot, const Mask<F>& active) const {
+    aovs_.begin<F>(camera_, r, slot, active);
+  }
 
   /// Returns whether some AOV needs first hits. Without one, the functions hit_light(),
   /// hit_surface() and hit_volume() do nothing.
@@ -144,6 +151,12 @@ class PathEvents {
     }
     return group;
   }
+
+  /// Records that the radiance of the paths in the first `slots` slots includes the emission at the
+  /// vertex at `depth`, but not its light sample.
+  void end_depth(uint32_t depth, size_t slots) const { aovs_.end_depth(depth, radiance_, slots); }
+  /// Records that the paths in the first `slots` slots have ended before the vertex at `depth`.
+  void end_path(uint32_t depth, size_t slots) const { aovs_.end_path(depth, radiance_, slots); }
 
   // ---- light ------------------------------------------------------------------------------------
 

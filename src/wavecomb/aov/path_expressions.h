@@ -155,7 +155,7 @@ class PathExpressions {
     row.light_event = v.light_scattering.event;
     row.light_diffuse = v.light_scattering.diffuse;
     row.light_end = end_of<F>(v.light_id, has_shadow);
-    const U path = hash_u32<U>(key.pixel_hash, key.sample);
+    const U path = path_hash<F>(key);
     const F u = unit_float<F>(hash_u32<U>(path, U(0x2c1b3c6du + depth)));
     row.from_states = row.states;
     row.bounce = select(Mask<U>(v.bounce.is_delta), U(0u), v.bounce.event + 1u);

@@ -27,6 +27,12 @@ inline SampleKey<F> make_sample_key(const UInt<F>& pixel, const UInt<F>& sample,
   return {hash_u32<UInt<F>>(pixel, UInt<F>(seed)), sample};
 }
 
+/// Returns a hash of a path, for random numbers that belong to no sample set.
+template <typename F>
+inline UInt<F> path_hash(const SampleKey<F>& key) {
+  return hash_u32<UInt<F>>(key.pixel_hash, key.sample);
+}
+
 /// Four sample values in [0, 1).
 template <typename F>
 struct Sample4 {
@@ -138,7 +144,7 @@ WAVECOMB_INLINE Sample4<F> sobol_4d(const SampleKey<F>& key, uint32_t set) {
 template <typename F>
 inline Sample4<F> independent_4d(const SampleKey<F>& key, uint32_t set) {
   using U = UInt<F>;
-  const U a = hash_u32<U>(hash_u32<U>(key.pixel_hash, key.sample), U(set));
+  const U a = hash_u32<U>(path_hash<F>(key), U(set));
   return {unit_float<F>(hash_u32<U>(a ^ 0x68bc21ebu)), unit_float<F>(hash_u32<U>(a ^ 0x02e5be93u)),
           unit_float<F>(hash_u32<U>(a ^ 0x967a889bu)), unit_float<F>(hash_u32<U>(a ^ 0x368cc8b7u))};
 }

@@ -109,7 +109,7 @@ class LightPathAovs {
                                           const Mask<F>& active) const {
     using U = UInt<F>;
     const U before = load_row<LightPathStateRow, F>(states_.rows, slot, active).states;
-    const U path = hash_u32<U>(key.pixel_hash, key.sample);
+    const U path = path_hash<F>(key);
     const F u = unit_float<F>(hash_u32<U>(path, U(0x51ed270bu + depth)));
     const U states = ColourStates::after<F>(backward_->next.data(), before, v.bounce, u, active);
     store_row<LightPathStateRow, F>(

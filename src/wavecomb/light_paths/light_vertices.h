@@ -88,7 +88,7 @@ inline Mask<F> store_light_vertex(const LightVertices& to, uint32_t depth,
   if (none(is_candidate)) return Mask<F>(false);
   LightVertexRow<F> row = load_row<LightVertexRow, F>(to.chosen, record.slot, is_candidate);
   row.vertices = row.vertices + 1u;
-  const U number = hash_u32<U>(path.key.pixel_hash, path.key.sample);
+  const U number = path_hash<F>(path.key);
   const F u = unit_float<F>(hash_u32<U>(number, U(0x7f4a7c15u + depth)));
   const Mask<F> replaces = is_candidate & (F(u * F(Int<F>(row.vertices))) < 1.f);
   row.p = select<F>(replaces, p, row.p);

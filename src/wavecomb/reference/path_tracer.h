@@ -56,7 +56,7 @@ class PathTracer : PathRecorder {
     history_.clear(1);
     radiance_ = {};
     const uint32_t last = trace_path(*task.pixels, task.first_sample);
-    aovs_.end_path(last, radiance(), 1);
+    events_.end_path(last, 1);
     if (context_.histories) context_.histories->ended(history_, radiance(), task);
     const F exposure = context_.camera->exposure;
     if (exposure != 1) {
@@ -136,7 +136,7 @@ class PathTracer : PathRecorder {
       }
       const ShadedVertex<F> shaded{.path = path, .t = hit.t, .material = material, .result = v};
       const uint32_t group = events_.vertex<true, F>({depth, kSlot, key, shaded, aovs}, true);
-      aovs_.end_depth(depth, radiance(), 1);
+      events_.end_depth(depth, 1);
       const bool is_free = v.has_shadow && trace_shadow(key, depth, v, group);
       joint_.use_vertex(depth, rays_);
       if (!probes_.empty() && aovs.light_weight >= 0.f)
@@ -157,7 +157,7 @@ class PathTracer : PathRecorder {
                                     : 0.f;
     rays_.begin(key, time);
     const CameraRay<F> ray = camera_ray<F>(*context_.camera, x, y, r, true, time);
-    aovs_.begin<F>(*context_.camera, r, kSlot, true);
+    events_.begin<F>(r, kSlot, true);
     path = {.dir = ray.d,
             .throughput = Color<F>(1.f),
             .cone_spread = ray.spread,

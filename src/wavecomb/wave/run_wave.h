@@ -55,12 +55,13 @@ struct CameraPaths {
   static void use_vertices(Wave& wave, const WaveContext& context, uint32_t depth) {
     JointStages::use_vertices(wave, context, depth);
   }
-  static void end_depth(Wave& wave, const WaveTask& task, uint32_t depth) {
-    wave.aovs.end_depth(depth, wave.pool.radiance, task.path_count());
+  static void end_depth(Wave& wave, const WaveContext& context, const WaveTask& task,
+                        uint32_t depth) {
+    wave.events(context).end_depth(depth, task.path_count());
   }
   static void resolve(Wave& wave, const WaveContext& context, const WaveTask& task,
                       uint32_t depth) {
-    wave.aovs.end_path(depth, wave.pool.radiance, task.path_count());
+    wave.events(context).end_path(depth, task.path_count());
     if (context.histories) context.histories->ended(wave.history, wave.pool.radiance, task);
     if (context.discards) return;
     wavecomb::resolve(wave, context, task);
@@ -107,7 +108,7 @@ void run_stages(Wave& wave, const WaveContext& context, const WaveTask& task, Pa
           std::chrono::duration<double, std::nano>(Clock::now() - start).count(),
           choice.prepare_ns);
     compact<F>(wave);
-    paths.end_depth(wave, task, depth);
+    paths.end_depth(wave, context, task, depth);
 
     if (wave.shadows.size > 0) {
       const RayOrderChoice shadow_order =

@@ -126,7 +126,7 @@ struct Wave {
   NestedMediaBuffers nested_media;  ///< buffers of the medium stack (medium/nested/nested_media.h)
   RadixSorter sorter, ray_sorter;
   std::vector<uint32_t> ray_indices;  ///< padded by one packet
-  std::vector<float> scratch;         ///< one value for each material, for policies
+  std::vector<float> scratch;  ///< one value for each material, which scheduling policies may use
   CostTracker costs;
   Chooser policy_chooser, ray_chooser, shadow_chooser;
   CoherenceCounts coherence;

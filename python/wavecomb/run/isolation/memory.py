@@ -170,8 +170,9 @@ one byte.
 def is_exhausted(error: BaseException, layer_bytes: Callable[[], int]) -> bool:
     """Returns whether an error means that this child process has reached its memory limit.
 
-    USD reports the same error if memory is exhausted and if a value in a file is damaged. The value
-    counts as damaged if even the largest value in files of this size would fit into the limit.
+    USD reports the same error if memory is exhausted and if a value in a file is damaged. Values in
+    files of a given size have a maximum size in memory. If that size is below the memory limit, the
+    value is taken to be damaged.
 
     Args:
         error: The MemoryError or USD error.

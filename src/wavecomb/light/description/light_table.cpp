@@ -261,9 +261,10 @@ std::vector<LightParameter> other_rows() {
            row<&L::visible>("visible", "visible", "",
                             "Whether camera and bounce rays can hit the light's shape.")),
       with(kHasTransform, kShape,
-           row<&L::motion>("motion", "motion", "",
-                           "Transforms of a moving light at k >= 2 equally spaced shutter times, "
-                           "(k, 4, 4); the one at mid-shutter defines its size.")),
+           row<&L::motion>(
+               "motion", "motion", "",
+               "Transforms of a moving light at k >= 2 equally spaced shutter times, "
+               "(k, 4, 4). The transform at the middle of the shutter defines its size.")),
       in(kShape,
          row<&L::portals>("portals", "portals", "",
                           "Transforms (k, 4, 4) of the unit square in the xy plane to k openings "

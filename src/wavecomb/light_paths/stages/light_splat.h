@@ -13,7 +13,7 @@ namespace wavecomb {
 /// path with sample key `key`.
 inline LightSplatPoint light_splat_point(const SampleKey<float>& key, uint32_t depth, float x,
                                          float y) {
-  const uint32_t path = hash_u32<uint32_t>(key.pixel_hash, key.sample);
+  const uint32_t path = path_hash<float>(key);
   return {x, y, hash_u32<uint32_t>(path, 0xb5297a4du + depth)};
 }
 

@@ -37,7 +37,8 @@ struct LightPathStages {
   void shadow(Wave& wave, const WaveContext& context, uint32_t depth) const {
     splat<F>(wave, context, *task, depth);
   }
-  static void end_depth(Wave& /*wave*/, const WaveTask& /*task*/, uint32_t /*depth*/) {}
+  static void end_depth(Wave& /*wave*/, const WaveContext& /*context*/, const WaveTask& /*task*/,
+                        uint32_t /*depth*/) {}
   static void use_vertices(Wave& /*wave*/, const WaveContext& /*context*/, uint32_t /*depth*/) {}
   static void resolve(Wave& wave, const WaveContext& context, const WaveTask& next_task,
                       uint32_t /*depth*/) {

@@ -28,7 +28,7 @@ struct SegmentRandom {
 
   SegmentRandom(SamplerKind sampler, const SampleKey<F>& key, uint32_t depth, VertexSet set)
       : r(sample_4d<F>(sampler, key, vertex_set(set, depth))),
-        seed(float_bits<F>(r.x) ^ hash_u32<UInt<F>>(key.pixel_hash, key.sample)) {}
+        seed(float_bits<F>(r.x) ^ path_hash<F>(key)) {}
   SegmentRandom(const MediumQuery<F>& p, VertexSet set)
       : SegmentRandom(p.sampler, p.key, p.depth, set) {}
   /// Returns a copy whose `seed` generates independent random numbers.

@@ -97,7 +97,7 @@ template <typename F, uint32_t kFeatures>
 WAVECOMB_INLINE Footprint<F> footprint_of(const Vertex<F, kFeatures>& v, const F& width) {
   using U = UInt<F>;
   if (v.depth == 0 || v.settings.filters_all_lookups) return width;
-  const U path = hash_u32<U>(v.key.pixel_hash, v.key.sample);
+  const U path = path_hash<F>(v.key);
   return {width, hash_u32<U>(path, U(0x7e3a15c1u + v.depth))};
 }
 

@@ -47,7 +47,7 @@ inline F cost_aware_survival(const SceneView& scene, const CostSnapshot& costs,
 template <typename F>
 inline F cost_aware_number(const SampleKey<F>& key, uint32_t depth) {
   using U = UInt<F>;
-  const U path = hash_u32<U>(key.pixel_hash, key.sample);
+  const U path = path_hash<F>(key);
   return unit_float<F>(hash_u32<U>(path, U(0x5f3759dfu + depth)));
 }
 

@@ -61,7 +61,7 @@ constexpr bool has_program_kernels(size_t program, size_t lanes) {
 /// lanes.
 inline constexpr bool kHasVolumePackets = !WAVECOMB_REDUCED_KERNELS;
 
-/// Whether plain kernels and reduced variants exist for packets of F.
+/// Whether the build has kernels of the kind `plain` for packets of F.
 template <typename F>
 inline constexpr bool kHasPlain = has_kernels("plain", kWidth<F>);
 

@@ -22,6 +22,7 @@ const float* generate(Wave& wave, const WaveContext& context, const WaveTask& ta
   float* tfar = wave.shadows.tfar;  // this column is unused until the first shading stage
   wave.aovs.clear(n);
   wave.history.clear(n);
+  const PathEvents events = wave.events(context);
   for (uint32_t i = 0; i < n; i += kWidth<F>) {
     const Mask<F> active = first_lanes<F>(n - i);
     const U slot = lane_index<F>() + i;
@@ -56,7 +57,7 @@ const float* generate(Wave& wave, const WaveContext& context, const WaveTask& ta
                            .key = key,
                            .receiver = UInt<F>(0u)},
                           active);
-    wave.aovs.begin<F>(camera, r, slot, active);
+    events.begin<F>(r, slot, active);
     store(rays.ox + i, ray.o.x);
     store(rays.oy + i, ray.o.y);
     store(rays.oz + i, ray.o.z);
