@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Ray traversal with Embree's functions alone, whose speed is the upper bound in benchmarks of ray
-/// tracing.
+/// Ray traversal that uses only Embree's functions. Benchmarks of ray tracing use its speed as the
+/// upper bound.
 #pragma once
 
 #include "wavecomb/accel/embree_accelerator.h"
@@ -9,11 +9,11 @@ namespace wavecomb {
 
 /// Ray tracer for benchmarks, which calls rtcIntersect and rtcOccluded in a loop, without filter
 /// functions, and only counts hits. The BVH is the same as in a render, since the same code builds
-/// it from the same arrays. Surfaces with partial presence are treated as opaque.
+/// it from the same arrays. Partially transparent surfaces (opacity below 1) are treated as opaque.
 ///
 /// Contract: the object reads the scene's arrays without copying them and keeps the scene alive.
-/// Several threads can trace rays at the same time. The arrays of a `RaySpan` must be readable for
-/// one packet of rays past the end, as the arrays of a `SoaBlock` are.
+/// Several threads can trace rays at the same time. It must be possible to read the arrays of a
+/// `RaySpan` up to one packet of rays past the end, as with the padded arrays of a `SoaBlock`.
 class BareTraversal {
  public:
   /// Builds the BVH with up to `threads` threads; 0 means all threads. Throws Error if Embree

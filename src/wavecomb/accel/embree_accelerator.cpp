@@ -33,7 +33,8 @@ struct PacketTypes<16> {
   using RayHit = RTCRayHit16;
 };
 
-/// Initialises `context`, and returns the arguments with which Embree's closest-hit queries use it.
+/// Initialises `context` and returns the arguments of Embree's closest-hit queries, which refer to
+/// this context.
 RTCIntersectArguments intersect_arguments(QueryContext& context, const SceneView& scene,
                                           const PresenceKeys& keys, uint32_t first_world,
                                           uint32_t first_light, bool coherent) {
@@ -70,8 +71,8 @@ bool is_mostly_hair(const Scene& scene) {
 
 }  // namespace
 
-/// The BVH, which accelerators of edited scenes share, and a view of the scene whose materials
-/// determine the opacity of surfaces.
+/// State of the accelerator: the BVH, which accelerators of edited scenes may share, and a view of
+/// the scene, from whose materials the opacity of surfaces is read.
 struct EmbreeAccelerator::Impl {
   std::shared_ptr<const Scene> scene;
   std::shared_ptr<const EmbreeHierarchy> hierarchy;
@@ -94,7 +95,7 @@ struct EmbreeAccelerator::Impl {
         list(hierarchy->rule() == HitRule::kList ? TriangleList::make(*scene) : nullptr),
         is_hair(is_mostly_hair(*scene)) {}
 
-  /// Hits of a packet as Embree reports them: arrays with one value per ray.
+  /// Hits of a packet as reported by Embree, in arrays with one value per ray.
   struct PacketHits {
     const float* t;  ///< QueryContext::t
     const float *u, *v;
@@ -225,10 +226,10 @@ struct EmbreeAccelerator::Impl {
 
   /// Returns the number of rays per packet, which is at most the native width. Embree would split
   /// wider packets and call filters with single rays, whose position in the packet is unknown. In
-  /// scenes with moving instances, rays are traced singly, since Embree inverts the transforms of
-  /// moving instances with different rounding in packets and single rays. Incoherent rays are also
-  /// traced singly in scenes of hair, because the rays of a packet would soon traverse different
-  /// BVH nodes.
+  /// scenes with moving instances, the result is 1, since Embree rounds the inverse transforms of
+  /// moving instances differently for packets and for single rays. For incoherent rays in scenes of
+  /// hair, the result is also 1, because the rays of a packet would soon traverse different BVH
+  /// nodes.
   uint32_t packet(uint32_t width, bool coherent, const PresenceKeys& keys) const {
     const bool parts = is_hair && !coherent && !keys.object;
     return parts || view.motion.instances ? 1 : std::min(width, native);

@@ -41,32 +41,34 @@ inline U object_of(const U& inst, const U& mesh) {
   return U(inst * 0x9e3779b1u) + mesh;
 }
 
-/// Data of each path that decides whether a surface with partial presence stops a ray. The decision
-/// is a hash of the path's sample and the primitive, so that it does not depend on the order of
-/// traversal. The arrays are indexed by path slot.
+/// Data of each path for the random decision whether a partially transparent surface (opacity
+/// between 0 and 1) stops a ray. The random number is a hash of the path's sample and the
+/// primitive, so that it does not depend on the order of traversal. The arrays are indexed by path
+/// slot.
 struct PresenceKeys {
   const uint32_t* pixel_hash = nullptr;
   const uint32_t* sample = nullptr;
   uint32_t stride = 1;  ///< distance between the values of consecutive slots in `pixel_hash` and
                         ///< `sample`, in 32-bit words
-  /// Input of the hash that differs for each depth, and for shadow rays, so that decisions along a
-  /// path are independent.
+  /// Further input of the hash. Each path depth has a different value, and shadow rays have other
+  /// values than bounce rays, so that decisions along a path are independent.
   uint32_t salt = 0;
   /// For each shadow ray, 1 + the index of the set of geometry that casts shadows from the ray's
   /// light, or 0 if all geometry casts shadows. Null if the scene has no light linking.
   const uint32_t* shadow_set = nullptr;
   uint32_t shadow_stride = 0;
   uint32_t ray_kind = kVisibleToCamera;  ///< a RayVisibility flag
-  /// The only object that each ray can hit, as a result of `object_of`, with the same stride as
-  /// `pixel_hash`. Such rays hit no lights. A null pointer means that rays can hit all objects.
+  /// For each ray, the only object that it can hit, as returned by `object_of`. The stride is the
+  /// same as for `pixel_hash`. Rays that are restricted to an object hit no lights. Null means that
+  /// rays can hit all objects.
   const uint32_t* object = nullptr;
 };
 
-/// Rule by which traversal chooses among hits at the same distance.
+/// Rule for the choice among hits at the same distance.
 enum class HitRule : uint8_t {
-  kCanonical,  ///< the same hit for any packet width and order of rays
+  kCanonical,  ///< hit that does not depend on packet width or the order of rays
                ///< (docs/decisions/canonical-hits.md)
-  kList,    ///< the same as kCanonical, but small static scenes use a `TriangleList`; the default
+  kList,    ///< same hits as kCanonical, but small static scenes use a `TriangleList`; the default
   kEmbree,  ///< the hit that Embree finds without filter functions; for `BareTraversal` only
 };
 
@@ -82,10 +84,10 @@ class EmbreeAccelerator {
   EmbreeAccelerator(std::shared_ptr<const Scene> scene, uint32_t threads,
                     HitRule rule = HitRule::kList);
   /// Creates an accelerator for an edited version of the scene of `origin`. The new accelerator
-  /// uses the BVHs of `origin` as far as they are valid for the edited scene. The BVH of a group is
-  /// rebuilt if the edit changes whether hits on one of its meshes are filtered or whether rays hit
-  /// a mesh from outside only. The top level is rebuilt if a group is rebuilt, an object moves, or
-  /// the shape or position of a light changes.
+  /// shares those BVHs of `origin` that are still valid for the edited scene. The BVH of a group is
+  /// rebuilt if the edit changes whether one of its meshes needs a hit filter or can be hit from
+  /// outside only. The top level is rebuilt if a group is rebuilt, an object moves, or the shape or
+  /// position of a light changes.
   EmbreeAccelerator(std::shared_ptr<const Scene> edited, const EmbreeAccelerator& origin,
                     uint32_t threads);
   ~EmbreeAccelerator();
@@ -93,9 +95,10 @@ class EmbreeAccelerator {
   /// Finds the closest hits of rays. `width` is the number of rays per packet: 1, 4, 8 or 16, but
   /// at most the native width. If `coherent` is true, the rays of a packet should have similar
   /// directions, and Embree traverses them together. The hits do not depend on `width` or the order
-  /// of rays. They do not depend on `coherent` either if all rays have the same origin; otherwise,
-  /// hits at edges may differ (docs/decisions/canonical-hits.md). `coherent` is ignored in scenes
-  /// with motion, and `width` in scenes with moving instances (docs/decisions/motion.md).
+  /// of rays. If all rays have the same origin, the hits do not depend on `coherent` either;
+  /// otherwise, hits at edges may differ (docs/decisions/canonical-hits.md). Scenes with motion
+  /// ignore `coherent`, and scenes with moving instances also ignore `width`
+  /// (docs/decisions/motion.md).
   void intersect(const RaySpan& rays, const HitSpan& hits, uint32_t width, bool coherent,
                  const PresenceKeys& keys) const;
   /// Sets `occluded[i]` to 1 if ray `i` hits something before its `tfar`, and to 0 otherwise.

@@ -17,9 +17,9 @@ const CurveGeometry& curves_of(const void* user) {
 }
 
 /// Intersects the rays of a packet with the curve segments of a BVH node. Calls `found(i,
-/// primitive, hit)` for ray `i` and each segment that it hits. `query` selects the first hit that
-/// is present for the ray's path, or any such hit. `wants(slot)` returns whether the ray of a path
-/// slot may hit the curves of this mesh.
+/// primitive, hit)` for ray `i` and each segment that it hits. `query` states whether to find the
+/// first hit or any hit; hits on curves that are not present for the ray's path are skipped.
+/// `wants(slot)` returns whether the ray of a path slot may hit the curves of this mesh.
 template <bool kBare, typename Arguments, typename Wants, typename Found>
 void for_hits(const Arguments& args, RTCRayN* rays, CurveQuery query, const Wants& wants,
               const Found& found) {

@@ -11,14 +11,14 @@
 
 namespace wavecomb {
 
-/// User data of an Embree geometry of curves, which must exist as long as the geometry.
+/// User data of an Embree geometry of curves. The data must exist as long as the geometry.
 struct CurveGeometry {
   const Mesh* mesh;
   uint32_t id;       ///< mesh index
   bool is_filtered;  ///< whether presence, visibility or light linking may reject hits
   bool is_fibre;     ///< whether rays hit the curves from outside only
-  /// BVH nodes of the curves, each of which is one primitive for Embree. Null for points and
-  /// deforming curves, whose primitives are the points or curve segments.
+  /// BVH nodes of the curves; Embree treats each node as one primitive. Null for points and for
+  /// deforming curves, where each point or curve segment is an Embree primitive.
   std::unique_ptr<const CurveBvhNodes> nodes;
 };
 

@@ -10,12 +10,12 @@
 namespace wavecomb {
 namespace {
 
-/// Filter function that makes the closest hit independent of the order in which triangles are
-/// tested. If two hits have the same distance up to rounding (on shared edges, or where surfaces
-/// intersect or coincide), Embree alone would keep the hit that it tests last, and the order of
-/// tests depends on the other rays of the packet. This filter keeps the hit with the smaller
-/// distance, and at equal distances the hit with the smaller id. The filter sets `tfar` slightly
-/// beyond the closest hit (`kSlack`), so that Embree tests all candidates.
+/// Filter function that makes the choice of the closest hit independent of the order in which
+/// Embree tests triangles. If two hits have the same distance up to rounding (on shared edges, or
+/// where surfaces intersect or coincide), Embree by itself would keep the hit that it tests last,
+/// and the order of its tests depends on the other rays of the packet. This filter keeps the hit
+/// with the smaller distance, and at equal distances the hit with the smaller id. The filter sets
+/// `tfar` slightly beyond the closest hit (`kSlack`), so that Embree tests all candidates.
 template <unsigned N>
 inline void keep_closest(const RTCFilterFunctionNArguments* args) {
   auto* best = reinterpret_cast<QueryContext*>(args->context);

@@ -13,9 +13,9 @@
 
 namespace wavecomb {
 
-/// State of a query, which Embree passes to the callbacks: the data that decide on presence, and
-/// the closest hits found so far for the rays of the packet. Packets have at most the native width,
-/// so that lane `i` in a callback is ray `i` of the packet.
+/// State of a query, which Embree passes to the callbacks: the inputs of presence decisions
+/// (presence.h), and the closest hits found so far for the rays of the packet. Packets have at most
+/// the native width, so that lane `i` in a callback is ray `i` of the packet.
 struct alignas(64) QueryContext {
   RTCRayQueryContext base;
   const SceneView* scene;  ///< scene whose materials determine the opacity of hits
@@ -24,7 +24,7 @@ struct alignas(64) QueryContext {
   uint32_t first_world, first_light;
   const unsigned *inst, *geom, *prim;  ///< ids of the closest hits so far, one value per ray
   alignas(64) float t[16];             ///< exact distances of the closest hits so far
-  std::optional<CurveRay> curve_ray;   ///< ray of the previous curve test, reused for the next test
+  std::optional<CurveRay> curve_ray;   ///< ray of the last curve test; the next test may reuse it
 };
 
 /// Factor by which `tfar` exceeds the distance of the closest hit, so that Embree also finds other
@@ -34,8 +34,8 @@ inline constexpr float kSlack = 1.f + 0x1p-20f;
 /// Calls `accepts_hit` for a point whose instance and geometry are given by Embree's ids.
 bool is_met_by_embree_ids(const QueryContext& context, const PresenceQuery& at);
 
-/// Filter function for the meshes that `filtered_meshes` marks. It rejects hits that `accepts_hit`
-/// does not accept. The geometry's user pointer holds the mesh index.
+/// Filter function for the meshes that `filtered_meshes` marks. It rejects hits for which
+/// `accepts_hit` returns false. The geometry's user pointer holds the mesh index.
 void presence_filter(const RTCFilterFunctionNArguments* args);
 /// Filter function of closest-hit queries, which makes the result independent of the order in which
 /// primitives are tested.

@@ -17,8 +17,7 @@
 namespace wavecomb {
 
 /// Embree device with its memory statistics. Hierarchies of the same device may share geometries,
-/// so only one hierarchy is built at a time. Rays can be traced in finished hierarchies at the same
-/// time.
+/// so only one hierarchy is built at a time. Meanwhile, rays can be traced in finished hierarchies.
 struct EmbreeDevice {
   RTCDevice handle = rtcNewDevice(nullptr);
   std::atomic<int64_t> bytes{0};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// The Embree device, geometries and scenes of an accelerator, which accelerators of edited scenes
-/// share.
+/// Embree device, geometries and scenes of an accelerator. The accelerators of edited scenes share
+/// them.
 #pragma once
 
 #include <embree4/rtcore.h>
@@ -20,14 +20,14 @@ struct EmbreeDevice;
 /// Embree objects of a scene: a geometry for each mesh, an Embree scene for each group, and the
 /// top-level Embree scene, which also contains the shapes of lights.
 ///
-/// Contract: the object is immutable and keeps the mesh arrays alive. Materials affect it only in
-/// the choice of meshes whose hits are filtered. The filter reads the materials of the scene in
-/// which rays are traced.
+/// Contract: the object is immutable and keeps the mesh arrays alive. Materials only determine
+/// which meshes have a hit filter. The filter reads the materials of the scene in which rays are
+/// traced.
 class EmbreeHierarchy {
  public:
-  /// Builds the hierarchy with up to `threads` threads; 0 means all threads. `origin` is null or
-  /// the hierarchy of a scene with the same meshes, whose device and unchanged geometries and
-  /// groups are shared. Throws `Error` if Embree fails.
+  /// Builds the hierarchy with up to `threads` threads; 0 means all threads. `origin` may be null.
+  /// Otherwise, it is the hierarchy of a scene with the same meshes, and the new hierarchy shares
+  /// its device and its unchanged geometries and groups. Throws `Error` if Embree fails.
   EmbreeHierarchy(const Scene& scene, HitRule rule, const EmbreeHierarchy* origin,
                   uint32_t threads);
   ~EmbreeHierarchy();
@@ -43,7 +43,7 @@ class EmbreeHierarchy {
   /// Embree geometry id of the first mesh of group 0, which is in world space.
   uint32_t first_world() const { return first_world_; }
   uint32_t first_light() const { return first_light_; }  ///< Embree geometry id of light record 0
-  /// Returns the memory of all hierarchies of the device in bytes.
+  /// Returns the memory use in bytes of all hierarchies that share the device.
   size_t bytes() const;
 
  private:
@@ -63,7 +63,7 @@ class EmbreeHierarchy {
   RTCScene top_ = nullptr;
   std::vector<RTCScene> group_scenes_;
   std::vector<RTCGeometry> mesh_geometries_;
-  /// Padded copies, by mesh, of vertex arrays that end at a page boundary.
+  /// Padded copies of vertex arrays that end at a page boundary, indexed by mesh.
   std::map<uint32_t, std::shared_ptr<const std::vector<float>>> padded_;
   std::map<uint32_t, std::shared_ptr<const CurveGeometry>> curves_;  ///< by mesh
   uint32_t first_world_ = 0, first_light_ = 0;

@@ -12,10 +12,11 @@ namespace wavecomb {
 /// Geometry of a light, without its emission.
 struct LightGeometry {
   LightShape shape = LightShape::kNone;
-  /// Light record, of which only kind, p, u, v and radius are set.
+  /// Light record in which only the members kind, p, u, v and radius are set.
   LightRecord light{};
   const LightKindInfo* kind = nullptr;  ///< null for kNone
-  LightMotion motion{};                 ///< motion of a moving light, whose shape is kCustom
+  LightMotion motion{};                 ///< motion of the light; moving lights have the shape
+                                        ///< kCustom
   std::vector<LightStep> steps;
 
   bool operator==(const LightGeometry& other) const;
@@ -29,8 +30,8 @@ Bounds custom_shape_bounds(const LightGeometry& shape);
 
 /// Returns the distance along `dir` to a light of shape `kCustom` in units of |dir|, or 0 if the
 /// ray misses the light. The function tests one ray at a time in double precision, so that hits do
-/// not depend on other rays. Embree's own spheres and discs round differently in packets and single
-/// rays. `time`: shutter time in [0, 1].
+/// not depend on other rays. Embree's built-in spheres and discs are not used, since their rounding
+/// differs between packets and single rays. `time`: shutter time in [0, 1].
 float intersect_custom_shape(const LightGeometry& shape, const float (&origin)[3],
                              const float (&dir)[3], float time);
 

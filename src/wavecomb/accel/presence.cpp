@@ -24,7 +24,7 @@ void mark_invisible(const Scene& scene, std::vector<uint8_t>& filtered) {
   }
 }
 
-/// Decides at random whether a surface is present. The probability is `opacity`, and the random
+/// Decides at random whether a surface stops a ray. The probability is `opacity`, and the random
 /// number is a hash of the path and the primitive.
 bool is_present_sample(float opacity, const PresenceQuery& at, const PresenceKeys& keys) {
   if (opacity >= 1.f) return true;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Decisions about presence: whether a surface with partial opacity stops a ray.
+/// Presence of surfaces: the random decision whether a partially transparent surface stops a ray.
 #pragma once
 
 #include <cstdint>
@@ -21,18 +21,18 @@ struct PresenceQuery {
 
 /// Returns whether a surface stops a ray. Surfaces of opacity 1 always do, and surfaces of opacity
 /// 0 never. Otherwise, the decision is random with the opacity as probability. The random number is
-/// a hash of the path, ray, instance and primitive, so that it does not depend on packets and the
-/// order of traversal. Does not read `geom`.
+/// a hash of the path, ray, instance and primitive, so that it depends neither on packets nor on
+/// the order of traversal. Does not read `geom`.
 bool is_present(const SceneView& scene, const PresenceQuery& at, const PresenceKeys& keys);
 
-/// Returns a value for each mesh, which is 1 if hits on the mesh must be filtered. This is the case
-/// if the mesh is partially present or invisible to some rays in at least one instance, bounds a
-/// medium, or consists of Gaussian splats, or if the scene has light linking.
+/// Returns one value per mesh: 1 if hits on the mesh must be filtered, else 0. Hits must be
+/// filtered if the mesh is partially transparent or invisible to some rays in at least one
+/// instance, bounds a medium, or consists of Gaussian splats, or if the scene has light linking.
 std::vector<uint8_t> filtered_meshes(const Scene& scene);
 
-/// Returns a value for each mesh, which is 1 for curves and points that have only hair materials in
-/// all instances. A hair BSDF includes scattering inside the fibre, so rays hit such meshes from
-/// outside only.
+/// Returns one value per mesh: 1 for curves and points that have only hair materials in all
+/// instances, else 0. A hair BSDF includes scattering inside the fibre, so rays hit such meshes
+/// from outside only.
 std::vector<uint8_t> fibre_meshes(const Scene& scene);
 
 /// Returns whether light linking lets geometry `geom` of an instance block the shadow ray of a path
@@ -47,9 +47,9 @@ inline bool is_of_object(const PresenceKeys& keys, uint32_t instance, uint32_t m
   return !keys.object || keys.object[size_t{slot} * keys.stride] == object_of(instance, mesh);
 }
 
-/// Returns whether the ray of a path slot hits the surface at a point. This requires that the ray
-/// is not restricted to another object and that the surface is present and visible to this kind of
-/// ray. For a shadow ray, the surface must also cast shadows from the ray's light.
+/// Returns whether the ray of a path slot hits the surface at a point. The ray must not be
+/// restricted to another object, and the surface must be present and visible to this kind of ray.
+/// For a shadow ray, the surface must also cast shadows from the ray's light.
 bool accepts_hit(const SceneView& scene, const PresenceQuery& at, const PresenceKeys& keys);
 
 }  // namespace wavecomb

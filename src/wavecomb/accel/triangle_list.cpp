@@ -38,8 +38,7 @@ struct ListTracer {
   const RaySpan& rays;
   const PresenceKeys& keys;
 
-  /// Intersection of rays with a plane, at the distance `height / slope`, where `slope` is at least
-  /// 0.
+  /// Intersection of rays with a plane at the distance `height / slope`. `slope` is at least 0.
   template <typename F>
   struct Plane {
     F height, slope;
@@ -52,12 +51,12 @@ struct ListTracer {
     Mask<F> in;  ///< inside the triangle
   };
 
-  /// The rays from index `base` to `base` + lane width - 1, and the vertex coordinates that all
-  /// triangle tests of these rays use.
+  /// Rays with the indices `base` to `base` + lane width - 1, and the vertex coordinates that the
+  /// tests of these rays against all triangles share.
   template <typename F>
   struct Packet {
     Vec3<F> o, d;
-    /// Coordinates of all vertices in a frame around each ray.
+    /// Coordinates of all vertices in the frame of each ray, whose z axis is along the ray.
     std::array<F, TriangleList::kMaxVertices> x, y;
 
     Packet(const TriangleList& list, const RaySpan& rays, size_t base)
@@ -216,7 +215,8 @@ struct ListTracer {
 
 namespace {
 
-/// Calls `trace` with a null pointer to `Lanes<width>`, from which `trace` derives its lane type.
+/// Calls `trace` with a null pointer to the lane type of the given width. `trace` uses only the
+/// type of this argument.
 template <typename Trace>
 void in_lanes(uint32_t width, const Trace& trace) {
   switch (width) {
@@ -272,8 +272,9 @@ std::unique_ptr<const TriangleList> TriangleList::make(const Scene& scene) {
       ++geom;
     }
   };
-  // Add instances first, then the objects in world space, and then the lights. In this order, hits
-  // at equal distance are chosen as `closest_filter` chooses them by Embree's ids.
+  // Add instances first, then the objects in world space, and then the lights. With this order, the
+  // choice among hits at equal distance is the same as that of `closest_filter`, which compares
+  // Embree's ids.
   for (uint32_t i = 0; i < geometry.instances.size(); ++i)
     add_group(geometry.instances[i].group, i + 1, geometry.instances[i].to_world);
   add_group(0, 0, Affine{});

@@ -15,12 +15,13 @@ namespace wavecomb {
 ///
 /// In scenes of fewer than about a hundred triangles, testing all triangles is faster than
 /// traversing a BVH. A packet holds one ray in each lane, and all lanes test the same triangle.
-/// Triangles are transformed to a frame with z along the ray, where the edge functions of two
-/// adjacent triangles are exact negatives (Woop, Benthin and Wald, "Watertight Ray/Triangle
-/// Intersection", JCGT 2(1) 2013; TriangleList replaces the paper's shear by a rotation, so that no
-/// lane has to choose an axis). The hit distance is the distance to the triangle's plane. No
-/// operation depends on other rays, and at equal distances the first triangle of the list is
-/// chosen, so hits do not depend on packets or the order of rays.
+/// Triangles are transformed to a frame with z along the ray, in which the two triangles of a
+/// shared edge compute edge functions that are exact negatives of each other (Woop, Benthin and
+/// Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1) 2013; TriangleList replaces the paper's
+/// shear by a rotation, so that no lane has to choose an axis). The hit distance is the distance to
+/// the triangle's plane. Results for a ray do not depend on other rays, and among hits at equal
+/// distance the first triangle of the list is chosen. Hits therefore depend neither on packets nor
+/// on the order of rays.
 ///
 /// Contract: the object is immutable. It reads materials from the `SceneView` that is passed to
 /// each call.
@@ -33,12 +34,12 @@ class TriangleList {
   /// Maximum number of lights that are not parallelograms.
   static constexpr uint32_t kMaxShapes = 4;
 
-  /// Makes the list of a scene. Returns null if the scene exceeds these limits or has motion,
-  /// curves or points.
+  /// Builds the triangle list of a scene. Returns null if the scene exceeds the limits above or has
+  /// motion, curves or points.
   static std::unique_ptr<const TriangleList> make(const Scene& scene);
 
-  /// Find the same hits as the functions of the same names in `EmbreeAccelerator`. `width` is 1, 4,
-  /// 8 or 16.
+  /// Find the same hits as the functions of `EmbreeAccelerator` with the same names. `width` is 1,
+  /// 4, 8 or 16.
   void intersect(const SceneView& scene, const RaySpan& rays, const HitSpan& hits, uint32_t width,
                  const PresenceKeys& keys) const;
   void occluded(const SceneView& scene, const RaySpan& rays, uint32_t* occluded, uint32_t width,
@@ -50,7 +51,7 @@ class TriangleList {
     float n[3], p[3];
     uint16_t vertex[3];
     bool filtered;       ///< whether hits must pass accepts_hit()
-    bool in_same_plane;  ///< whether `n` and `p` equal those of the previous triangle
+    bool in_same_plane;  ///< whether `n` and `p` are the same as in the previous triangle
     uint32_t mesh;
   };
   struct Vertex {
@@ -61,8 +62,8 @@ class TriangleList {
     LightGeometry light_geometry;
     float centre[3], radius;
   };
-  /// Ids that describe a hit on each entry of the list. The entries are the triangles, then the
-  /// light shapes, then one entry for a miss.
+  /// For each entry of the list, the ids of a hit on the entry. The entries are the triangles, then
+  /// the light shapes, then one entry for a miss.
   struct Ids {
     std::vector<uint32_t> prim, geom, inst;
   };

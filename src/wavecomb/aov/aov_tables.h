@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Tables that map indices of the scene to the object ids, light groups and light path expressions
-/// of AOVs.
+/// Tables that AOVs use to map the scene's indices to object ids, light groups and light path
+/// expressions.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ namespace wavecomb {
 
 class Scene;
 
-/// Value of a layer index for a light group without a layer.
+/// Layer index of a light group that has no layer.
 inline constexpr uint32_t kNoGroup = 0xffffffffu;
 
 /// AOV tables of a render. The tables are built once and read by all waves.
@@ -26,8 +26,8 @@ struct AovTables {
   CryptoTables crypto;
   /// For each light, the index of its light group among the film's light groups, or `kNoGroup`.
   std::vector<uint32_t> film_group;
-  /// Index of the light group for emission of surfaces and volumes that are no lights, or
-  /// `kNoGroup`.
+  /// Index of the light group that contains the emission of surfaces and volumes that are not
+  /// lights, or `kNoGroup`.
   uint32_t group_of_rest = kNoGroup;
   /// Names of the film's light groups, followed by the names of its light path expressions.
   std::vector<std::string> layer_names;
@@ -39,7 +39,8 @@ struct AovTables {
   std::vector<uint32_t> end_of_light;
   /// Argument `multipliers` of `PathExpressions`. Empty if no expression needs multipliers.
   std::vector<float> multipliers;
-  /// Whether the cost AOV contains modelled costs, which are reproducible, and not measured times.
+  /// Whether the cost AOV contains modelled costs, which are reproducible, instead of measured
+  /// times.
   bool models_cost = false;
   bool connects = false;  ///< whether camera paths connect to light paths
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Cost of each path for the cost AOV, which is a measured time or a modelled cost (docs/aovs.md).
+/// Cost of each path for the cost AOV. Costs are measured times or come from a model
+/// (docs/aovs.md).
 #pragma once
 
 #include <chrono>
@@ -9,8 +10,8 @@
 
 namespace wavecomb {
 
-/// Modelled cost of a ray in nanoseconds. It is close to the time of tracing a ray in a scene of a
-/// million triangles.
+/// Modelled cost of a ray in nanoseconds. The value is close to the time that tracing a ray takes
+/// in a scene of a million triangles.
 inline constexpr float kModelRayNs = 250;
 
 /// Array with the cost of each path, for the cost AOV.
@@ -24,7 +25,7 @@ class PathCostRows {
       : cost_ns_(capacity > 0 ? SlotRows(capacity, 1) : SlotRows()), models_(models) {}
 
   bool wants_cost() const { return bool(cost_ns_); }
-  /// Returns whether the cost AOV contains modelled costs and not measured times.
+  /// Returns whether the cost AOV contains modelled costs instead of measured times.
   bool models_cost() const { return wants_cost() && models_; }
   bool wants_time() const { return wants_cost() && !models_cost(); }
   /// Adds a modelled cost in nanoseconds to a path. The caller adds the costs of a path in the

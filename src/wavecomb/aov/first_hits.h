@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Values of AOVs that are known at the first hit of a camera ray, before shading.
+/// AOV values that are known at the first hit of a camera ray, before shading.
 #pragma once
 
 #include <limits>

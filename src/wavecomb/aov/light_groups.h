@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Functions that add radiance to light groups, which run only if the render has light group AOVs.
+/// Functions that add radiance to light groups. They are called only if the render has light group
+/// AOVs.
 #pragma once
 
 #include "wavecomb/aov/aov_tables.h"

@@ -8,9 +8,9 @@
 ///   end_depth    the radiance includes the emission at vertex `depth`, but not its light sample
 ///   resolve      the path's values are added to the film
 ///
-/// Only the requested AOVs are stored. Splitting the radiance into emission, direct and indirect
-/// light adds no work to shading, since it only needs copies of the radiance before the light
-/// samples of the first two vertices.
+/// Only the requested AOVs are stored. The split of the radiance into emission, direct and indirect
+/// light adds no work to shading. It only needs copies of the radiance before the light samples of
+/// the first two vertices.
 #pragma once
 
 #include <array>
@@ -31,7 +31,7 @@
 
 namespace wavecomb {
 
-/// Technique by which a path finds the light of a contribution, one bit each.
+/// Technique that finds the light of a contribution. Each technique is one bit of a mask.
 enum class Technique : uint32_t {
   kEmitter = 1,      ///< A ray of the camera or of a bounce hits an emitter or leaves the scene.
   kVolume = 2,       ///< A ray of the camera or of a bounce passes an emissive volume.
@@ -50,8 +50,8 @@ struct TechniqueAov {
   constexpr TechniqueAov(Aov of, uint32_t bits) : aov(of), techniques(bits) {}
   constexpr TechniqueAov(Aov of, Technique one) : TechniqueAov(of, static_cast<uint32_t>(one)) {}
 };
-/// AOVs that sum contributions by technique. `kByBounces` is the rest of the radiance without
-/// `kByLightSamples`.
+/// AOVs that sum contributions by technique. `kByBounces` is not listed, since it is the radiance
+/// minus `kByLightSamples`.
 inline constexpr TechniqueAov kTechniqueAovs[] = {
     {Aov::kByLightSamples, Technique::kLightSample | Technique::kConnection},
 };
@@ -59,7 +59,7 @@ inline constexpr TechniqueAov kTechniqueAovs[] = {
 /// Contribution of light to paths.
 template <typename F>
 struct LightEvent {
-  uint32_t depth;  ///< of the vertex where the path found the light
+  uint32_t depth;  ///< depth of the vertex where the path found the light
   const UInt<F>& slot;
   const Color<F>& c;
 };
@@ -184,7 +184,7 @@ class PathAovs : public PathFirstHits, public PathCostRows {
   bool wants(Technique technique) const {
     return (wanted_techniques_ & static_cast<uint32_t>(technique)) != 0;
   }
-  /// Returns whether some AOV separates the contributions of lights.
+  /// Returns whether some AOV needs the light of each contribution.
   bool wants_lights() const { return groups_ || expressions_; }
   /// Returns the index of the stored light group of each lane's light, or kNoGroup.
   template <typename F>
@@ -196,8 +196,8 @@ class PathAovs : public PathFirstHits, public PathCostRows {
 
   /// Adds a contribution to the AOVs of the paths in the active lanes, whose slots must be
   /// distinct. `source` is the light, or kNoLight; for light samples, it is the result of
-  /// group_of(), and for volumes it is not used. Connections do not change light path expressions,
-  /// because the joint transport knows their events.
+  /// group_of(), and for volumes it is not used. For connections, the joint transport, which knows
+  /// their scattering events, updates the light path expressions.
   template <Technique kTechnique, typename F>
   void light(const LightEvent<F>& e, const UInt<F>& source, const Mask<F>& active) const {
     constexpr bool kIsVolume = kTechnique == Technique::kVolume;
@@ -283,8 +283,8 @@ class PathAovs : public PathFirstHits, public PathCostRows {
       for (uint32_t slot = begin; slot < end; ++slot) each(slot);
     }
   };
-  // Parts of resolve(). In this order, they add the ends of camera rays, values of vertices and
-  // first hits, radiance by source, and bounces and costs to the film.
+  // Parts of resolve(). These functions add to the film, in this order: ends of camera rays; values
+  // of vertices and first hits; radiance by source; bounces and costs.
   void resolve_ends(AovFilm& film, size_t pixel, const SlotRange& slots,
                     const float* radiance) const;
   void resolve_vertices(AovFilm& film, size_t pixel, const SlotRange& slots) const;
@@ -321,7 +321,7 @@ class PathAovs : public PathFirstHits, public PathCostRows {
         add_radiance<F>(by_technique_[i].rows, slot, c, active);
   }
 
-  /// Value in `vertex_at_` for AOVs that `vertex_` does not store.
+  /// Value of `vertex_at_` for AOVs that are not stored in `vertex_`.
   static constexpr uint32_t kNoWords = 0xffffffffu;
   static constexpr std::array<uint32_t, kAovCount> no_words() {
     std::array<uint32_t, kAovCount> at{};
@@ -342,7 +342,8 @@ class PathAovs : public PathFirstHits, public PathCostRows {
                            {g.albedo, g.normal, select(v.is_clear, F(0.f), F(1.f))}, updates);
   }
 
-  /// Adds the bounce of a vertex to the sums over bounces, if the vertex has a bounce.
+  /// Adds the values of a vertex's bounce to the sums over all bounces. Does nothing if the vertex
+  /// has no bounce.
   template <typename F>
   void add_bounce(const UInt<F>& slot, const VertexAovs<F>& v, const Mask<F>& active) const {
     const Mask<F> has_survival = active & (v.survival >= 0.f);
@@ -361,8 +362,8 @@ class PathAovs : public PathFirstHits, public PathCostRows {
   std::array<uint32_t, kAovCount> vertex_at_ = no_words();
   std::array<Block, 2> parts_;  ///< radiance before the light samples of vertices 0 and 1
   /// Contributions of connections at the first vertices of camera paths. These contributions count
-  /// as indirect light. They must be stored, since the difference of the two radiance copies in
-  /// `parts_` includes them in direct light.
+  /// as indirect light. They must be stored separately, since the difference between the two copies
+  /// in `parts_`, which is the direct light, would otherwise include them.
   Block early_connections_;
   Block groups_;  ///< radiance of each light group; the values of a slot are adjacent
   Block guides_, bounces_;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Events of camera paths. Waves and the reference integrator call the functions of `PathEvents`
 /// for each event of a path: its start, its first hit, its ray segments through media, its
-/// vertices, and each contribution of light. The functions add to the radiance of the path, to its
-/// AOVs and to the stored vertices from which the guiding field learns.
+/// vertices, and each contribution of light. The functions update the radiance of the path, its
+/// AOVs, and the stored vertices that later train the guiding field.
 #pragma once
 
 #include "wavecomb/aov/path_aovs.h"
@@ -13,7 +13,7 @@
 
 namespace wavecomb {
 
-/// End point of camera rays, in scene units, and the shutter time of each ray.
+/// End points of camera rays in world space, and the shutter times of the rays.
 template <typename F>
 struct RayEnd {
   const UInt<F>& slot;
@@ -31,9 +31,10 @@ struct VertexEvent {
   const VertexAovs<F>& aovs;
 };
 
-/// Returns the volume or mesh medium, and the material, of the volume events in the lanes
-/// `stopped`. `material` is the material of the events. `stacks` points to the MediumStackRow of
-/// each slot; it may be null if the scene has no nested dielectrics.
+/// Returns the volume, or the mesh that a medium fills, and the material of scattering events in
+/// the lanes `stopped`. `material` is the material index that free-flight sampling returned.
+/// `stacks` points to the MediumStackRow of each slot; it may be null if the scene has no nested
+/// dielectrics.
 template <typename F>
 VolumeHit<F> volume_hit(const SceneView& scene, const float* stacks, const UInt<F>& slot,
                         const UInt<F>& material, const Mask<F>& stopped) {
@@ -53,7 +54,8 @@ VolumeHit<F> volume_hit(const SceneView& scene, const float* stacks, const UInt<
 /// Receiver of the events of camera paths. `active` marks the lanes of the event; the slots of
 /// active lanes must be distinct.
 ///
-/// Contract: refers to the buffers of one wave or one reference integrator, which must outlive it.
+/// Contract: the object refers to the buffers of one wave or reference integrator, which must
+/// outlive the object.
 class PathEvents {
  public:
   /// `radiance` points to the RadianceRow of each slot.
@@ -70,8 +72,8 @@ class PathEvents {
     aovs_.begin<F>(camera_, r, slot, active);
   }
 
-  /// Returns whether some AOV needs first hits. Without one, the functions hit_light(),
-  /// hit_surface() and hit_volume() do nothing.
+  /// Returns whether some AOV needs first hits. If not, the functions hit_light(), hit_surface()
+  /// and hit_volume() do nothing.
   bool wants_hits() const { return aovs_.wants_hits() || aovs_.wants_alpha(); }
 
   /// Records camera rays that hit the shapes of the lights `light`.
@@ -161,8 +163,8 @@ class PathEvents {
   // ---- light ------------------------------------------------------------------------------------
 
   /// Adds contributions of light that paths found by `kTechnique`. `source()` returns the light of
-  /// each lane, or kNoLight; for light samples, it returns the result of vertex(). It is called
-  /// only if an AOV needs it.
+  /// each lane, or kNoLight; for light samples, it returns the result of vertex(). `source` is
+  /// called only if an AOV needs the light.
   template <Technique kTechnique, typename F, typename Source>
   WAVECOMB_INLINE void light(const LightEvent<F>& e, const Source& source,
                              const Mask<F>& active) const {

@@ -3,13 +3,13 @@
 /// functions of this file run only if the render has light path expressions.
 ///
 /// A path stores an automaton state for each colour component (red, green, blue). If a fraction s
-/// of the scattered light in a colour component is diffuse, the automaton of this component takes
-/// the diffuse event with probability s, and the glossy event otherwise. All three components use
-/// the same random number. Later contributions are added without weights to all expressions that
-/// match the state. Complementary layers therefore add up to the beauty, and the mean of each layer
-/// is correct. Light samples are split in proportion to s, without a random choice. The emission of
-/// a light that a bounce hits is split in the same way if the light has different diffuse and
-/// specular multipliers.
+/// of the scattered light in a colour component is diffuse, the automaton of this component
+/// receives the diffuse event with probability s, and the glossy event otherwise. All three
+/// components use the same random number. Later contributions are added without weights to all
+/// expressions that match the state. Complementary layers therefore add up to the beauty, and each
+/// layer is unbiased. Light samples are split in proportion to s, without a random choice. The
+/// emission of a light that a bounce hits is split in the same way if the light has different
+/// diffuse and specular multipliers.
 #pragma once
 
 #include <array>
@@ -91,10 +91,9 @@ struct ColourStates {
 class PathExpressions {
  public:
   PathExpressions() = default;
-  /// `end_of_light` contains the path end of each light, as a result of `path_end`, followed by the
-  /// path end of other emissive surfaces and the path end of volumes. `multipliers` contains the
-  /// diffuse and the specular multiplier of each light. If `multipliers` is empty, all multipliers
-  /// are 1.
+  /// `end_of_light` contains the index (`path_end()`) of the path end of each light, followed by
+  /// the path ends of other emissive surfaces and of volumes. `multipliers` contains the diffuse
+  /// and the specular multiplier of each light. If `multipliers` is empty, all multipliers are 1.
   PathExpressions(size_t capacity, const PathAutomaton& automaton,
                   const std::vector<uint32_t>& end_of_light, const std::vector<float>& multipliers)
       : automaton_(&automaton),

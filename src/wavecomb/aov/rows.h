@@ -20,8 +20,8 @@ struct FirstHitRow {
   WAVECOMB_FIELDS(position, object, material, instance, depth, distance)
 };
 
-/// Scattering event of a path in a medium: the material, and the index of the volume or the result
-/// of `instance_geometry` for the mesh that the medium fills.
+/// Scattering event of a path in a medium. The medium is a volume with the index `volume` or, in
+/// the lanes `in_mesh`, fills the mesh `object` (a result of `instance_geometry`).
 template <typename F>
 struct VolumeHit {
   UInt<F> volume, object, material;
@@ -56,7 +56,7 @@ inline void for_each_hit_value(const FirstHitRow<float>& hit, const Put& put) {
 }
 
 /// Inputs of the denoiser: albedo and normal of the path's first vertex on a surface that is not
-/// clear, or of the last vertex so far if all surfaces were clear.
+/// clear (glass and mirrors are clear), or of the latest vertex if all surfaces so far were clear.
 template <typename F>
 struct GuideRow {
   Color<F> albedo;
@@ -89,8 +89,8 @@ struct SlotRows {
   size_t bytes() const { return owner.bytes(); }
 };
 
-/// Stores the components of `value` in consecutive words of `rows`, starting at the word `at` of
-/// each lane.
+/// Stores the components of `value` in consecutive words of `rows`. `at` is the index of the first
+/// word in each lane.
 template <typename F>
 inline void scatter_words(float* rows, const F& value, const UInt<F>& at, const Mask<F>& active) {
   scatter<F>(rows, value, at, active);

@@ -15,7 +15,7 @@
 
 namespace wavecomb {
 
-/// Method by which the samples of a pixel are combined to the pixel's value.
+/// Method that combines the samples of a pixel into the pixel's value.
 enum class AovKind : uint8_t {
   kMean,         ///< the mean over all samples of the pixel
   kMeanOfHits,   ///< the mean over samples that hit something; infinite if no sample did
@@ -35,8 +35,8 @@ enum class AovSource : uint8_t {
   kVertex,     ///< The value is known after the first vertex has been shaded.
   kGuide,      ///< The value is known after the last vertex that provides denoiser features.
   kLight,      ///< The value changes whenever light contributes to the path.
-  kTechnique,  ///< The value is the light that some techniques have found, such as light samples.
-  kTime,       ///< The value is a time measured with the clock.
+  kTechnique,  ///< The value is the light that certain techniques found, such as light sampling.
+  kTime,       ///< The value is a time that was measured with the clock.
   kBounce,     ///< The value accumulates over all bounces of the path.
 };
 
@@ -44,7 +44,7 @@ enum class AovSource : uint8_t {
 /// window displays the layer.
 enum class AovContent : uint8_t {
   kLight,      ///< radiance, which is displayed with exposure and tone mapping
-  kColour,     ///< reflectance or transmittance, 0 to 1
+  kColour,     ///< reflectance or transmittance, between 0 and 1
   kDirection,  ///< unit vector
   kId,         ///< index of an object or material, or hashes of names
   kExact,      ///< number that must be stored without lossy compression

@@ -34,8 +34,8 @@ WAVECOMB_INLINE Frame<F> make_frame(const Vec3<F>& n) {
 
 /// Returns a frame around the unit vector `n` where s is `tangent` made orthogonal to n and t is
 /// cross(n, s) times `handedness` (1 or -1). Falls back to make_frame(n) if the tangent is parallel
-/// to n (within 1e-3), zero or not finite. This threshold is far above rounding errors, so that
-/// rounding errors never determine s.
+/// to n (within 1e-3), zero or not finite. This threshold is far above rounding errors, so s never
+/// depends on rounding errors alone.
 template <typename F>
 inline Frame<F> make_frame(const Vec3<F>& n, const Vec3<F>& tangent, const F& handedness = F(1.f)) {
   const Vec3<F> s = fma(n, F(-dot(n, tangent)), tangent);

@@ -76,7 +76,7 @@ inline F acos(const F& x) {
   return atan2(safe_sqrt(F((1.f - c) * (1.f + c))), c);
 }
 
-/// Returns e^x. Returns 0 if x is below -87.3, and clamps x to 88.
+/// Returns e^x, or 0 if x is below -87.3. Values of x above 88 are treated as 88.
 template <LaneValue F, bool = true>
 inline F exp(const F& x) {
   const F c = clamp(x, F(-88.f), F(88.f));

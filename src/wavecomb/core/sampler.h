@@ -56,9 +56,9 @@ enum class VertexSet : uint32_t {
 /// Upper limit of path depths that have distinct sample sets.
 inline constexpr uint32_t kSetDepths = 1u << 23;
 
-/// Returns the index of the sample set `name` at a depth of the path. The index of the sets
-/// `kLight` and `kBsdf` is 1 + 2 * depth and 2 + 2 * depth. Each other vertex set has a separate
-/// block of indices.
+/// Returns the index of the sample set `name` at a depth of the path. The sets `kLight` and `kBsdf`
+/// have the indices 1 + 2 * depth and 2 + 2 * depth. Each other vertex set has a separate block of
+/// indices.
 inline constexpr uint32_t vertex_set(VertexSet name, uint32_t depth) {
   const auto i = static_cast<uint32_t>(name);
   return i < 2 ? 1 + i + 2 * depth : (i << 24) + depth;
@@ -128,8 +128,8 @@ WAVECOMB_INLINE Sample4<F> sobol_4d(const SampleKey<F>& key, uint32_t set) {
   // Shuffle the order of the points, so that different sample sets are independent.
   const U index = reverse_bits<U>(laine_karras<U>(reverse_bits<U>(key.sample), seed)) &
                   ((1u << kIndexBits) - 1u);
-  // The bit-reversed value of dimension 0 is the index, and that of dimension 1 the product of
-  // Pascal's matrix modulo 2 with the index.
+  // The bit-reversed value of dimension 0 is the index. The bit-reversed value of dimension 1 is
+  // the product of Pascal's matrix modulo 2 and the index.
   U d1 = index;
   d1 ^= d1 >> 16;
   d1 ^= (d1 & 0xff00ff00u) >> 8;

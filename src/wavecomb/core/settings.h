@@ -23,9 +23,10 @@ constexpr float default_filter_width(FilterKind kind) {
 }
 
 enum class IntegratorKind : uint8_t { kWavefront, kReference };
-/// Whether pilot renders decide on path guiding and light paths, where `Settings::guiding` and
-/// `Settings::transport` are `kAuto`. With `kAuto`, pilot renders are made before the first pass.
-/// With `kPlain`, no pilot renders are made, and neither path guiding nor light paths are used.
+/// Use of pilot renders. With `kAuto`, pilot renders before the first pass decide about path
+/// guiding if `Settings::guiding` is `kAuto`, and about light paths if `Settings::transport` is
+/// `kAuto`. With `kPlain`, there are no pilot renders, and settings that are `kAuto` turn off path
+/// guiding and light paths.
 enum class Quality : uint8_t { kAuto, kPlain };
 /// Light transport method. With `kPath`, all paths start at the camera. With `kLight`, a light path
 /// is traced for each camera path, and both are combined by multiple importance sampling
@@ -36,7 +37,7 @@ enum class Transport : uint8_t { kPath, kLight, kAuto, kBdpt };
 /// Treatment of fireflies, which are very bright and rare samples: keep their full weight, or
 /// reduce it (film/cascades.h).
 enum class Firefly : uint8_t { kKeep, kReweight };
-/// Method by which a vertex selects a light to sample: by power, or with a light tree
+/// Method of selecting a light to sample at a vertex: by power, or with a light tree
 /// (light/sampling/tree_choice.h). `kAuto` uses a light tree if the scene has enough lights for a
 /// tree to reduce noise.
 enum class LightSelection : uint8_t { kAuto, kTree, kPower };
@@ -52,17 +53,17 @@ enum class RayOrder : uint8_t { kSlot, kMorton, kMortonOctant, kDirection, kAuto
 /// Source of the shading costs of materials. `kAuto` uses measured costs for the shading order, and
 /// the fixed cost model for Russian roulette, so that images are reproducible.
 enum class CostSource : uint8_t { kAuto, kMeasured, kModel };
-/// Whether rays are passed to Embree in packets or singly.
+/// Whether rays are passed to Embree in packets or one at a time.
 enum class Traversal : uint8_t { kPackets, kSingle };
 /// Texture filtering method. With `kAuto`, hits of camera rays use full filtering, and hits after
 /// bounces read one random texel (docs/decisions/one-texel.md). With `kWhole`, all hits use full
 /// filtering.
 enum class TextureFilter : uint8_t { kAuto, kWhole };
 /// Distribution of light splats over pixels. With `kFiltered`, a light splat contributes to all
-/// pixels around it, with the weights of the pixel filter. With `kPixel`, it contributes to one of
-/// them, chosen at random with these weights: there is more noise, but the noise of different
-/// pixels is independent, which denoisers expect. `kAuto` means `kPixel` if the render stores the
-/// denoiser's guides, else `kFiltered`.
+/// pixels around it, with the weights of the pixel filter. With `kPixel`, it contributes to only
+/// one of these pixels, chosen at random in proportion to the weights. This increases noise, but
+/// makes the noise of different pixels independent, as denoisers expect. `kAuto` means `kPixel` if
+/// the render stores the denoiser's guides, else `kFiltered`.
 enum class LightSplats : uint8_t { kAuto, kFiltered, kPixel };
 /// Distribution of a render's samples over pixels (render/passes/allotment.h).
 enum class Allocate : uint8_t { kEven, kError, kEfficiency };
@@ -104,8 +105,8 @@ struct Settings {
   std::optional<float> filter_width;
   RouletteKind roulette = RouletteKind::kAuto;
   uint32_t roulette_depth = 2;  ///< first vertex at which Russian roulette may terminate a path
-  /// Source of material costs. Only cost-aware roulette lets costs change the image. With
-  /// `kMeasured`, such images vary from run to run.
+  /// Source of material costs. Costs change the image only through cost-aware roulette; with
+  /// `kMeasured` costs, such an image varies from run to run.
   CostSource costs = CostSource::kAuto;
   float clamp_indirect = 0;  ///< maximum luminance of an indirect contribution; 0 means no limit
   bool schlick_fresnel = false;
@@ -131,7 +132,7 @@ struct Settings {
   /// specular reflection or refraction (light_paths/merge_grid.h). 0 means no merging.
   float merge_radius = 0;
   Firefly firefly = Firefly::kKeep;
-  /// AOVs to store; the beauty does not depend on them, except by LightSplats::kAuto.
+  /// AOVs to store. They do not change the beauty, except through LightSplats::kAuto.
   AovSet aovs;
   /// Names of the light groups that `Aov::kLightGroups` stores. An empty list means all light
   /// groups.
@@ -146,7 +147,8 @@ struct Settings {
   /// Error limit of the whole image: the render stops when the mean relative error of the image is
   /// at most this value. 0 means no limit. This setting cannot be combined with `adaptive`.
   float noise = 0;
-  uint32_t min_spp = 16;  ///< adaptive sampling: samples before the first error estimate
+  uint32_t min_spp = 16;  ///< samples per pixel before the first error estimate of adaptive
+                          ///< sampling
   /// Distribution of samples over pixels in renders whose total sample count is set by spp or a
   /// time limit.
   Allocate allocate = Allocate::kEven;
@@ -155,14 +157,14 @@ struct Settings {
   float time_limit = 0;
   /// Whether dome lights and distant lights are transparent to the camera, for compositing.
   bool alpha = false;
-  bool error = false;  ///< whether to store error and variance estimates even if no setting needs
-                       ///< them
+  bool error = false;  ///< whether to store error and variance estimates even if no other setting
+                       ///< needs them
   /// Pixels to render; other pixels get no samples. If not set, all pixels are rendered. Rendered
   /// pixels have the same values as in a render of the whole image, except in adaptive renders,
   /// which estimate errors within the region only.
   std::optional<Region> region;
-  /// Number of additional pixels at each edge outside of the camera window. `width` and `height`
-  /// include these pixels.
+  /// Number of pixels that are added outside of the camera window at each edge. `width` and
+  /// `height` include these pixels.
   uint32_t overscan = 0;
   bool crop = false;  ///< whether the film and the image contain only the pixels of `region`
   // ---- below: how the image is computed; never changes it ----
@@ -174,13 +176,12 @@ struct Settings {
   /// hits (docs/decisions/canonical-hits.md).
   Traversal traversal = Traversal::kPackets;
   std::string policy = "code";
-  /// Whether queued hits are moved into shading order. `kAuto` reads them by index, which is
-  /// faster.
+  /// Whether queued hits are moved in memory into shading order; `kAuto` means `kOff`.
   Materialize materialize = Materialize::kAuto;
   RayOrder ray_order = RayOrder::kAuto;     ///< for bounce rays
   RayOrder shadow_order = RayOrder::kAuto;  ///< for shadow rays
-  /// Whether the first passes have 1, 1, 2, 4, ... samples per pixel, so that the whole image
-  /// appears soon.
+  /// Whether the first passes have 1, 1, 2, 4, ... samples per pixel, so that a first version of
+  /// the whole image appears soon.
   bool progressive = false;
   float cost_weight = 0.3f;  ///< weight of a pass in the moving average of costs, 0 to 1
 

@@ -147,7 +147,7 @@ std::vector<SettingInfo> image_settings() {
           "filters.",
           [](const S& s) -> SettingValue { return double{s.used_filter_width()}; })),
       in_expectation(number<&S::clamp_indirect>("clamp_indirect", "Clamp indirect", 0, 1e30f,
-                                                "Maximum luminance of an indirect contribution, "
+                                                "Clamps indirect contributions to this luminance, "
                                                 "which reduces fireflies but darkens the image.",
                                                 "off")),
       in_expectation(choice<&S::schlick_fresnel>(
@@ -158,10 +158,10 @@ std::vector<SettingInfo> image_settings() {
       in_expectation(
           choice<&S::texture_filter>("texture_filter", "Texture filter",
                                      {{"auto",
-                                       "Textures are fully filtered at directly visible points and "
-                                       "read one random texel after a bounce."},
+                                       "Directly visible points use full texture filtering; hits "
+                                       "after a bounce read one random texel."},
                                       {"whole", "Textures are fully filtered at all hits."}},
-                                     "Where textures are fully filtered.")),
+                                     "Hits that use full texture filtering.")),
       row<&S::cosine_sampling>("cosine_sampling", "Cosine sampling",
                                "Samples non-specular bounces with a cosine-weighted density "
                                "instead of the BSDF, for comparisons."),
@@ -188,47 +188,46 @@ std::vector<SettingInfo> work_settings() {
   return {
       choice<&S::roulette>(
           "roulette", "Roulette",
-          {{"auto", "Roulette runs in mode efficient with path guiding, else in mode throughput."},
-           {"off", "Roulette is off, so it terminates no path before the maximum depth."},
+          {{"auto", "Same as `efficient` if paths are guided, otherwise same as `throughput`."},
+           {"off", "Russian roulette is disabled, so paths continue up to the maximum depth."},
            {"throughput", "The survival probability of a path grows with its throughput."},
            {"cost-aware",
             "The survival probability of a path grows with its throughput / sqrt(shading cost)."},
            {"efficient",
-            "The survival probability of a path follows its expected contribution and cost, "
-            "learned before the first pass."}},
+            "The survival probability of a path depends on its expected contribution and cost, "
+            "which are learned before the first pass."}},
           "Russian roulette, which terminates paths early without bias."),
       choice<&S::quality>(
           "quality", "Quality",
-          {{"auto",
-            "Path guiding and light paths are used where short pilot renders predict a gain."},
-           {"plain", "Mode auto of guiding and transport means no guiding and no light paths."}},
-          "Whether short pilot renders decide about path guiding and light paths."),
+          {{"auto", "Path guiding and light paths are used if short pilot renders predict a gain."},
+           {"plain", "Without pilot renders, guiding and light paths are off unless requested."}},
+          "Whether short pilot renders decide if path guiding and light paths are used."),
       choice<&S::transport>(
           "transport", "Transport",
           {{"path", "Paths start at the camera only."},
            {"light",
             "Paths start at the camera and at the lights, combined by multiple "
             "importance sampling, for caustics of small lights."},
-           {"auto", "As mode light if a pilot render predicts a gain, else as mode path."},
+           {"auto", "Same as `light` if a pilot render predicts a gain, otherwise same as `path`."},
            {"bdpt",
-            "Vertices of camera and light paths are also connected, so far "
-            "without a benefit."}},
+            "Vertices of camera and light paths are also connected, which is "
+            "not more efficient than `light` in any measured scene."}},
           "Whether paths start at the camera only or also at the lights."),
       choice<&S::light_aim>(
           "light_aim", "Light path aiming",
-          {{"off", "Light paths start according to the emission of the lights alone."},
+          {{"off", "Light paths are emitted in proportion to the emission of the lights only."},
            {"on", "Light paths mostly start where earlier pilot paths contributed to the image."}},
           "How the starting points and directions of light paths are chosen."),
       choice<&S::light_splats>(
           "light_splats", "Light splats",
-          {{"auto", "Mode pixel in renders that are denoised, else mode filtered."},
-           {"filtered", "To all pixels around, with the weights of the pixel filter."},
-           {"pixel", "To one of them at random, since denoisers need independent noise."}},
+          {{"auto", "Same as `pixel` in renders that are denoised, otherwise same as `filtered`."},
+           {"filtered", "Adds light to all pixels nearby, weighted by the pixel filter."},
+           {"pixel", "Adds light to one random pixel, since denoisers need independent noise."}},
           "How light paths add light to the pixels around a point that the camera sees."),
       in_expectation(
           number<&S::merge_radius>("merge_radius", "Merge radius", 0, 64,
-                                   "Radius in pixels within which light paths merge at points seen "
-                                   "in mirrors or through glass, which blurs these caustics.",
+                                   "Radius in pixels of path merging, which finds caustics seen "
+                                   "in mirrors or through glass, but blurs them.",
                                    "never")),
       in_expectation(choice<&S::firefly>(
           "firefly", "Fireflies",
@@ -239,7 +238,7 @@ std::vector<SettingInfo> work_settings() {
           "Treatment of samples that are much brighter than their neighbours.")),
       number<&S::roulette_depth>(
           "roulette_depth", "From depth", 0, kMaxDepth,
-          "First vertex of a path at which Russian roulette may terminate it."),
+          "First path vertex at which Russian roulette may terminate a path."),
   };
 }
 
@@ -254,13 +253,13 @@ std::vector<SettingInfo> choice_settings() {
            {"tree",
             "A light tree chooses lights by their expected contribution at the shading point."},
            {"power", "Lights are chosen in proportion to their power, independent of position."}},
-          "How a light to sample is chosen at a shading point."),
+          "Method that chooses which light to sample at a shading point."),
       choice<&S::light_weights>("light_weights", "Light weights",
                                 {{"calibrated",
                                   "The weight of a light is its contribution to the image, "
                                   "measured with a pilot render."},
                                  {"power", "The weight of a light is its power."}},
-                                "Weight of each light in the choice of a light to sample."),
+                                "Weights of the lights in light selection."),
       choice<&S::equiangular>(
           "equiangular", "Equiangular",
           {{"off", "Scattering distances are sampled by the density of the medium only."},
@@ -272,8 +271,8 @@ std::vector<SettingInfo> choice_settings() {
           "guiding", "Guiding",
           {{"auto", "Path guiding is used if a short pilot render predicts that it reduces noise."},
            {"on", "Path guiding is used wherever the guiding field has training data."},
-           {"off", "Bounce directions are sampled by material only, without path guiding."}},
-          "Path guiding, which also samples bounces by learned incident light."),
+           {"off", "Bounce directions are sampled by the BSDF only, without path guiding."}},
+          "Path guiding, which samples some bounce directions by learned incident light."),
       number<&S::learn_memory_mb>("learn_memory", "Learning (MB)", 1, 1u << 16,
                                   "Memory limit of the path guiding field in MB."),
   };
@@ -289,18 +288,20 @@ std::vector<SettingInfo> sample_settings() {
       number<&S::noise>("noise", "Noise", 0, 1,
                         "Renders until the image's mean relative error is below this value.",
                         "off"),
-      number<&S::min_spp>("min_spp", "Min samples", 1, kMaxSamples,
-                          "Samples per pixel before adaptive sampling first estimates the error."),
+      number<&S::min_spp>(
+          "min_spp", "Min samples", 1, kMaxSamples,
+          "Samples per pixel before adaptive sampling estimates errors for the first time."),
       same_bits(
           number<&S::spp>("spp", "Samples", 1, kMaxSamples,
-                          "Number of samples per pixel, or their maximum with adaptive sampling.")),
+                          "Number of samples per pixel, or the maximum with adaptive sampling.")),
       choice<&S::allocate>(
           "allocate", "Sample allocation",
           {{"even", "All pixels get the same number of samples."},
            {"error",
-            "Pixels of larger relative error (standard deviation / brightness) get more samples."},
+            "Pixels with larger relative error (standard deviation / brightness) get more "
+            "samples."},
            {"efficiency",
-            "Pixels whose error falls most for the cost of a sample get more samples."}},
+            "Pixels whose error falls most per unit of rendering cost get more samples."}},
           "How samples are distributed over pixels."),
       number<&S::time_limit>("time_limit", "Time limit", 0, 1e9f,
                              "Stops rendering after this many seconds.", "none"),
@@ -316,16 +317,16 @@ std::vector<SettingInfo> order_settings() {
           "integrator", "Integrator",
           {{"wavefront", "The wavefront integrator advances waves of thousands of paths together."},
            {"reference",
-            "The reference integrator traces one path at a time; it is slow and serves to check "
-            "the wavefront."}},
+            "The reference integrator traces one path at a time; it is slow, and serves to verify "
+            "the wavefront integrator."}},
           "Integrator that traces the paths."),
       choice<&S::costs>("costs", "Costs",
                         {{"auto",
-                          "Shading costs are calibrated, then measured, but roulette uses the "
-                          "reproducible cost model."},
+                          "Shading costs are calibrated, then measured during the render; "
+                          "roulette uses the reproducible cost model."},
                          {"measured",
-                          "Shading costs are calibrated, then measured, also for cost-aware "
-                          "roulette, which makes the image vary within its noise."},
+                          "Shading costs are calibrated, then measured during the render, also "
+                          "for cost-aware roulette; images then vary within their noise."},
                          {"model",
                           "Shading costs are fixed, reproducible estimates from the material's "
                           "program and texture reads."}},
@@ -335,18 +336,17 @@ std::vector<SettingInfo> order_settings() {
                             "The order in which bounce rays are traced."),
       choice<&S::shadow_order>("shadow_order", "Shadow order", ray_orders(),
                                "The order in which shadow rays are traced."),
-      with_steps(row<&S::lanes>("lanes", "Lanes",
-                                "Number of SIMD lanes, that is, of hits that are shaded at once."),
-                 {1, 4, 8, 16}, "auto"),
+      with_steps(
+          row<&S::lanes>("lanes", "Lanes", "Number of SIMD lanes, each of which shades one hit."),
+          {1, 4, 8, 16}, "auto"),
       number<&S::wave_size>("wave_size", "Wave size", 64, 1 << 20,
-                            "Number of paths in a wave, which a thread processes together.",
+                            "Number of paths in a wave, which one thread processes together.",
                             "automatic"),
-      choice<&S::materialize>(
-          "materialize", "Materialize",
-          {{"auto", "Inputs of shading are read through indices, which is faster than copying."},
-           {"on", "Inputs of shading are copied into shading order first."},
-           {"off", "Inputs of shading are read through indices, without copies."}},
-          "Whether the inputs of shading are copied into shading order."),
+      choice<&S::materialize>("materialize", "Materialize",
+                              {{"auto", "Same as `off`, which is faster."},
+                               {"on", "Shading inputs are first copied into the order of shading."},
+                               {"off", "Shading inputs are read through indices, without copies."}},
+                              "Whether shading inputs are copied into the order of shading."),
       choice<&S::traversal>(
           "traversal", "Traversal",
           {{"packets", "Embree traces rays in packets."},

@@ -46,8 +46,8 @@ struct SettingInfo {
   /// count.
   bool changes_bits = true;
   /// Whether the setting changes the expected value of the image, that is, its limit for many
-  /// samples. Settings without this flag change only noise, work, or the layers that describe noise
-  /// and work.
+  /// samples. Settings without this flag change only noise, the amount of work, or layers that show
+  /// noise or work.
   bool changes_expectation = false;
   SettingGroup group = SettingGroup::kImage;
   /// Smallest and largest allowed number. There are no limits if `least` exceeds `most`.

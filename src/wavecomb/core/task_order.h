@@ -12,9 +12,9 @@
 
 namespace wavecomb {
 
-/// Annotations of a parallel loop. They state that code before the loop happens before the loop's
-/// tasks, and that the tasks happen before the call of join(). They state no order between the
-/// tasks of the loop. TaskOrder does nothing in builds without ThreadSanitizer.
+/// Annotations of a parallel loop. They state that the code before the loop runs before the loop's
+/// tasks, and that the tasks run before the call of join() returns. They do not order the tasks of
+/// the loop among themselves. TaskOrder does nothing in builds without ThreadSanitizer.
 ///
 ///     const TaskOrder order;
 ///     tbb::parallel_for(size_t{0}, n, order.around([&](size_t i) { ... }));

@@ -43,9 +43,8 @@ class AovFilm {
 
   /// Number of Cryptomatte levels, which are objects, materials and assets.
   static constexpr uint32_t kCryptoLevels = 3;
-  /// Number of ids per pixel in the image, although `CryptoPixel` counts up to `kIds` ids. An RGBA
-  /// layer contains two ids with their coverage, so image files have three layers per Cryptomatte
-  /// level.
+  /// Number of ids per pixel in the image. `CryptoPixel` counts more ids than these. An RGBA layer
+  /// contains two ids with their coverage, so image files have three layers per Cryptomatte level.
   static constexpr uint32_t kCryptoRanks = 6;
 
   const AovLayout& layout() const { return layout_; }

@@ -46,9 +46,9 @@ class Cascades {
   bool empty() const { return sums_.empty(); }
   /// Adds a sample of the pixel with the index `pixel` (a result of `Film::index`).
   void add(size_t pixel, const float* rgb);
-  /// Returns the radiance that firefly reduction subtracts from the mean of each pixel, as
-  /// interleaved RGB values. The result is empty if no cascades are stored. `samples` is the sample
-  /// count of each pixel.
+  /// Returns the RGB radiance, interleaved, that firefly reduction subtracts from the mean of each
+  /// pixel. The result is empty if no cascades are stored. `samples` is the sample count of each
+  /// pixel.
   std::vector<float> excess(const std::vector<uint32_t>& samples) const;
   size_t bytes() const { return sums_.size() * sizeof(Sum); }
   /// Calls `block(name, values)` with the sums of the cascades, to write or read checkpoints.

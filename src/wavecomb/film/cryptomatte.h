@@ -27,11 +27,11 @@ uint32_t crypto_id(std::string_view name);
 
 /// Ids of the samples of one pixel with their sample counts, in constant memory.
 ///
-/// Sample counts are exact while a pixel has at most kIds ids. A further id replaces the id with
-/// the fewest samples and inherits its count (A. Metwally, D. Agrawal, A. El Abbadi, "Efficient
-/// Computation of Frequent and Top-k Elements in Data Streams", 2005). Therefore, the counts always
-/// add up to the number of samples that hit something, no count is too small, and every id with
-/// more than 1 / kIds of the samples is in the list.
+/// Sample counts are exact while a pixel has at most kIds ids. After that, each new id replaces the
+/// id with the fewest samples and inherits its count (A. Metwally, D. Agrawal, A. El Abbadi,
+/// "Efficient Computation of Frequent and Top-k Elements in Data Streams", 2005). Therefore, the
+/// counts always add up to the number of samples that hit something, no count is too small, and
+/// every id with more than 1 / kIds of the samples is in the list.
 struct CryptoPixel {
   static constexpr uint32_t kIds = 8;
   uint32_t id[kIds] = {};

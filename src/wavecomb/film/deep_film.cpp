@@ -15,7 +15,7 @@ namespace {
 
 static_assert(kMaxDeepSamples <= 255, "counted in a byte");
 
-/// Returns the length of a depth range divided by the depth of its far end.
+/// Returns the length of a depth range relative to the depth of its far end.
 float spread(float front, float back) {
   return back > 0 ? (back - front) / back : 0.f;
 }
@@ -39,7 +39,7 @@ DeepFilm::DeepFilm(size_t pixels, const DeepLimits& limits)
 void DeepFilm::add(size_t pixel, float z, bool in_volume, const float* rgb) {
   const DeepBin sample{rgb[0], rgb[1], rgb[2], z, z, 1, in_volume ? 1u : 0u};
   const uint32_t n = used_[pixel];
-  uint32_t at = 0;  // index of the first bin whose far end is at z or beyond
+  uint32_t at = 0;  // index of the first bin that does not end in front of z
   while (at < n && bin(pixel, at).back < z) ++at;
   const auto spread_with = [&](uint32_t i) {
     if (i >= n) return std::numeric_limits<float>::infinity();

@@ -1,19 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Sums of a deep image during rendering, in which the samples of each pixel are grouped in bins by
-/// depth (docs/deep.md).
+/// Sums of a deep image during rendering. The samples of each pixel are grouped into depth bins
+/// (docs/deep.md).
 ///
-/// A camera ray that hits a surface or scatters in a volume gives its pixel one sample: a depth and
-/// the radiance of its path. Samples of similar depth share a bin. The bins of a pixel are disjoint
-/// depth ranges in ascending order. A bin stores the number n of its samples and the sum C of their
-/// radiance. N is the number of samples of the pixel. The coverage of a bin is s = n / N, and r is
-/// the part of the pixel that the bins in front of it do not cover:
+/// Each camera ray that hits a surface or scatters in a volume adds one sample to its pixel: a
+/// depth and the radiance of the path. Samples of similar depth share a bin. The bins of a pixel
+/// are disjoint depth ranges in ascending order. A bin stores the number n of its samples and the
+/// sum C of their radiance. N is the number of samples of the pixel. The coverage of a bin is s = n
+/// / N, and r is the part of the pixel that the bins in front of it do not cover:
 ///   r_0 = 1,  r_{i+1} = r_i - s_i,   alpha_i = s_i / r_i,   color_i = C_i / (N r_i).
 /// Compositing the bins with "over", sum_i color_i prod_{j<i} (1 - alpha_j), gives sum_i C_i / N,
 /// which is the colour of the pixel in the flat image, and the covered fraction of the pixel as
 /// alpha.
 ///
 /// A pixel has at most `DeepLimits::most` bins. If a sample would exceed this limit, two
-/// neighbouring bins are merged, whose common depth range is the smallest relative to its depth.
+/// neighbouring bins are merged: the pair whose combined depth range is the smallest relative to
+/// its depth.
 #pragma once
 
 #include <cstddef>
@@ -36,7 +37,7 @@ struct DeepBin {
   uint32_t in_volume = 0;      ///< number of samples that scattered in a volume
 };
 
-/// Allocator that gets zeroed memory from calloc, so that pages take no physical memory until they
+/// Allocator that uses calloc, so that pages of zeroed memory take no physical memory until they
 /// are written. The default value of the element type must consist of zero bytes.
 template <typename T>
 struct ZeroedMemory {
@@ -86,8 +87,8 @@ class DeepFilm {
   void add(size_t pixel, float z, bool in_volume, const float* rgb);
   /// Returns the deep samples of all pixels. `samples` is the sample count of each pixel.
   DeepLayer layer(const std::vector<uint32_t>& samples) const;
-  /// Returns the state of the deep image for checkpoints. It begins with one byte per pixel, the
-  /// number of its bins, followed by the bins of all pixels.
+  /// Returns the state of the deep image for checkpoints. The state consists of one byte per pixel
+  /// with the number of the pixel's bins, followed by the bins of all pixels.
   std::vector<std::byte> packed() const;
   /// Restores the state that packed() returned. Throws `Error` if the bytes do not match the size
   /// of this image.
@@ -102,8 +103,8 @@ class DeepFilm {
 
   DeepLimits limits_;
   std::vector<uint8_t> used_;  ///< number of bins in use for each pixel
-  /// Bin 0 of all pixels, followed by bin 1 of all pixels, and so on. In this order, bins that no
-  /// pixel uses take no physical memory.
+  /// Bin 0 of all pixels, followed by bin 1 of all pixels, and so on. With this layout, memory
+  /// pages of bins that no pixel uses take no physical memory.
   std::vector<DeepBin, ZeroedMemory<DeepBin>> bins_;
 };
 

@@ -46,9 +46,9 @@ class Film {
   Pixel& pixel(uint32_t x, uint32_t y) { return pixels_[index(x, y)]; }
   ErrorSums& error(uint32_t x, uint32_t y) { return errors_[index(x, y)]; }
   /// Allocates fixed-point sums of light splats in units of `unit`, for the beauty and for AOVs
-  /// that include light splats. `paths` is the number of light path indices, each of which
-  /// represents `scale` light paths per sample. With light splats, the beauty is the sum of the
-  /// means of camera paths and light splats.
+  /// that include light splats. `paths` is the number of light path indices. Each index stands for
+  /// `scale` light paths per sample. With light splats, the beauty is the sum of the means of
+  /// camera paths and light splats.
   void allocate_light_splats(FixedPoint unit, size_t paths = 0, double scale = 1) {
     splats_ = LightSplatLayer(pixels_.size(), unit, paths, scale, has_error());
     aovs_.allocate_light_splats(unit);
@@ -58,11 +58,11 @@ class Film {
   /// of the pass are traced.
   void allocate_joint_rows(size_t words) { joint_rows_.assign(pixels_.size() * words, 0.f); }
   std::span<const float> joint_rows() const { return joint_rows_; }
-  /// Sets the row of pixel `i` that `allocate_joint_rows` has allocated.
+  /// Sets the row of pixel `i`, which must have been allocated by `allocate_joint_rows`.
   void set_joint_row(size_t i, std::span<const float> row) {
     std::copy(row.begin(), row.end(), joint_rows_.data() + i * row.size());
   }
-  /// Adds all light splats of `list` and clears it.
+  /// Adds all light splats of `list` to the film and clears the list.
   void take(LightSplatList& list) {
     splats_.add(list);
     list.clear();
@@ -96,7 +96,7 @@ class Film {
            splats_.bytes() + cascades_.bytes() + joint_rows_.size() * sizeof(float);
   }
 
-  /// Returns the mean of each pixel as interleaved RGB values, with reduced fireflies if the film
+  /// Returns the mean of each pixel as interleaved RGB values, after firefly reduction if the film
   /// has cascades. Pixels without samples and light splats are black.
   std::vector<float> beauty() const;
   /// Returns the mean of each pixel as interleaved RGB values, without firefly reduction.

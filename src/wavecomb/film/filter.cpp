@@ -44,8 +44,8 @@ FilterTable::FilterTable(FilterKind kind, float width)
     offsets_[bin] = static_cast<float>(((step + within) / kSteps - 0.5) * width);
   }
   offsets_[kBins + 1] = offsets_[kBins];
-  // Tabulate the density of offsets that are interpolated from the table. In the tails, this
-  // density differs from the density of the filter.
+  // Tabulate the density of offsets that are sampled by interpolation in the table. In the tails,
+  // it differs from the density of the filter itself.
   uint32_t from = 0;
   const auto share_below = [&](double x) {
     while (from + 1 < kBins && double{offsets_[from + 1]} <= x) ++from;

@@ -50,7 +50,7 @@ class MedianSketch {
   enum Word : uint32_t { kScale, kCount, kInfinite, kHeights, kPositions = kHeights + 5 };
   static constexpr uint32_t kMarkers = 5;
 
-  /// Returns the number of values below marker `i`.
+  /// Returns how many values are below marker `i`.
   double marker_position(uint32_t i) const {
     if (i == 0) return 0;
     return i + 1 == kMarkers ? s_[kCount] - 1 : s_[kPositions + i - 1];

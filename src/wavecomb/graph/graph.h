@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Value graphs: flat programs over a small register file that compute material parameters.
+/// Value graphs, which are flat programs with a small set of registers that compute material
+/// parameters.
 ///
-/// A register holds one float per SIMD lane; a vector of 2 to 4 components occupies consecutive
+/// A register holds one float per SIMD lane. A vector of 2 to 4 components occupies consecutive
 /// registers. Python compiles the shader networks of a stage to such programs
 /// (wavecomb/usd/graphs/values.py); the C++ code in graph/ only runs the programs.
 #pragma once
@@ -14,8 +15,9 @@
 
 namespace wavecomb {
 
-/// Operations of value graphs, which work on each component unless noted. The comments call the
-/// operands a, b and c. The order of the operations must match `graph_codes` in the bindings.
+/// Operations of value graphs. Unless noted otherwise, they work on each component separately. The
+/// comments call the operands a, b and c. The order of the operations must match `graph_codes` in
+/// the bindings.
 enum class GraphCode : uint8_t {
   kCopy,   ///< component k of the result is operand k
   kInput,  ///< GraphInput `number`
@@ -25,7 +27,7 @@ enum class GraphCode : uint8_t {
   kMultiply,
   kDivide,  ///< a / b, 0 if b is 0
   kModulo,  ///< a - b floor(a / b), 0 where b is 0
-  kPower,   ///< a^b, 0 if a < 0
+  kPower,   ///< a^b; 0 if a < 0 and b is not 0
   kMin,
   kMax,
   kAtan2,       ///< atan2(a, b), radians
@@ -50,14 +52,15 @@ enum class GraphCode : uint8_t {
   kHsvToRgb,
   kNoise2,  ///< gradient noise at point a, as `width` uncorrelated values
   kNoise3,
-  kFractal3,  ///< fractal noise at point a with `number` octaves, lacunarity b and diminish c
+  kFractal3,  ///< fractal noise at point a with `number` octaves, frequency factor b and amplitude
+              ///< factor c
   kCell2,     ///< cell noise at point a, as `width` values
   kCell3,
-  /// Worley noise at point a with jitter b: the `width` smallest distances, or the value of the
-  /// nearest cell if `number` is 1.
+  /// Worley noise at point a with jitter b. The result is the `width` smallest distances or, if
+  /// `number` is 1, the value of the nearest cell.
   kWorley2,
   kWorley3,
-  /// Attribute `number` of the mesh; operand a if the mesh has no such attribute of `width`
+  /// Attribute `number` of the mesh, or operand a if the mesh has no such attribute with `width`
   /// components.
   kAttribute,
 };
@@ -73,8 +76,8 @@ enum class GraphInput : uint8_t {
   kTangent,        ///< unit tangent along u in world space
   kBitangent,      ///< unit vector perpendicular to normal and tangent, towards increasing v
   kView,           ///< unit direction to the viewer in world space
-  /// Images of the local axes under the normal transform, in world space: rows of the inverse of
-  /// the instance transform.
+  /// World-space images of the local axes under the normal transform. These are the rows of the
+  /// inverse of the instance transform.
   kNormalX,
   kNormalY,
   kNormalZ,
@@ -108,17 +111,17 @@ static_assert(sizeof(GraphOp) == 16);
 /// Image that a program reads.
 struct GraphImage {
   uint32_t texture;
-  /// Scale from distances in mesh texture coordinates to distances in image coordinates.
+  /// Factor that converts distances in mesh texture coordinates to distances in image coordinates.
   float stretch;
 };
 
-/// Output of a program: index of the parameter that it drives, and operand with the parameter's
-/// value.
+/// Output of a program: index of the parameter component that the output drives, and operand that
+/// holds the value.
 struct GraphOutput {
   uint16_t parameter, from;
 };
 
-/// Graph program under construction.
+/// Graph program that has not been added to a GraphSet yet.
 struct Graph {
   std::vector<GraphOp> ops;
   std::vector<float> constants;
@@ -126,8 +129,8 @@ struct Graph {
   std::vector<GraphOutput> outputs;
   /// Names of the attributes that kAttribute operations read by index.
   std::vector<std::string> attributes;
-  /// Returns whether an output drives any of the `count` parameter components from index `first`
-  /// on.
+  /// Returns whether an output drives any of the `count` parameter components that start at index
+  /// `first`.
   bool drives(uint32_t first, uint32_t count = 1) const {
     for (const GraphOutput& o : outputs)
       if (o.parameter >= first && o.parameter < first + count) return true;

@@ -21,7 +21,7 @@ inline U rotate_left(const U& x, uint32_t k) {
   return (x << k) | (x >> (32 - k));
 }
 
-/// Returns Jenkins' lookup3 hash of N words; the hash first mixes up to three words, then the
+/// Returns Jenkins' lookup3 hash of N words. The first three words are mixed together, and then a
 /// fourth.
 template <typename U, size_t N>
 inline U hash(const U (&words)[N]) {

@@ -21,7 +21,7 @@ struct GraphPoint {
   Vec3<F> view{F(0.f), F(0.f), F(1.f)};
   Vec3<F> normal_x{F(1.f), F(0.f), F(0.f)}, normal_y{F(0.f), F(1.f), F(0.f)},
       normal_z{F(0.f), F(0.f), F(1.f)};
-  MeshPosition<F> mesh_position;  ///< position on the mesh, at which attributes are interpolated
+  MeshPosition<F> mesh_position;  ///< position on the mesh where attributes are interpolated
 };
 
 /// Runs `program` for all active lanes with the inputs `at`. `registers` has room for

@@ -112,13 +112,14 @@ inline F bounded_log(const F& a) {
   return wavecomb::log(wavecomb::clamp(a, F(1.17549435e-38f), F(3.4e38f)));
 }
 
-/// Returns x^y; 1 for y = 0, and 0 for x < 0 otherwise.
+/// Returns x^y. The result is 1 if y is 0, and 0 if x < 0 and y is not 0.
 template <typename F>
 inline F power(const F& x, const F& y) {
   return select(y == 0.f, F(1.f), wavecomb::pow(x, y));
 }
 
-/// Computes `width` noise values: up to three from one hash, and a fourth at an offset position.
+/// Computes `width` noise values. Up to three values share one hash; a fourth is evaluated at an
+/// offset position.
 template <typename F, size_t N>
 inline void noise_values(const F (&p)[N], uint32_t width, F* out) {
   if (width == 1) {
@@ -135,7 +136,8 @@ inline void noise_values(const F (&p)[N], uint32_t width, F* out) {
   noise::perlin<1, F>(q, out + 3);
 }
 
-/// Sums `count` octaves of gradient noise, each `lacunarity` times finer and scaled by `diminish`.
+/// Sums `count` octaves of gradient noise, where each octave is `lacunarity` times finer than the
+/// previous octave and scaled by a further factor `diminish`.
 template <size_t K, typename F>
 inline void octaves(const F (&p)[3], uint32_t count, const F& lacunarity, const F& diminish,
                     F* out) {
@@ -163,8 +165,9 @@ inline void fractal_values(const F (&p)[3], uint32_t width, uint32_t count, cons
   if (width == 4) octaves<1, F>(offset_point, count, lacunarity, diminish, out + 3);
 }
 
-/// Operation of a graph with its operands and results. An operation reads its operands while it
-/// writes results, so check_graph() requires that their registers do not overlap.
+/// Operation of a graph with its operands and results. An operation may write results before it has
+/// read all operands, so check_graph() requires that the registers of results and operands do not
+/// overlap.
 template <typename F>
 struct GraphStep {
   const GraphOp& code;

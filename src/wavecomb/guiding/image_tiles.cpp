@@ -45,7 +45,8 @@ ImageTiles::ImageTiles(const Settings& settings, std::span<const uint32_t> pixel
   const auto mean = [&](const Tile& t) {
     return t.count == 0 ? 0 : kStep * static_cast<double>(t.sum) / static_cast<double>(t.count);
   };
-  // Regularise the division as in relMSE, since the few paths of a tile may miss its light.
+  // Regularise the division as in the relMSE metric, since the few paths of a tile may miss its
+  // light.
   const double least = 0.05 * mean(all) * mean(all);
   for (const Tile& tile : tiles) {
     const double m = mean(tile);

@@ -28,8 +28,8 @@ class ImageTiles {
   uint32_t of(uint32_t pixel) const;
   /// Returns whether any path contributed light.
   bool is_lit() const { return !inverse_.empty(); }
-  /// Returns one over the brightness of the image at a pixel: the mean over its tile, with each
-  /// path clamped to 64 times the median. Contract: is_lit().
+  /// Returns one over the brightness of the image at a pixel: the mean over its tile, in which the
+  /// luminance of each path is clamped to 64 times the median luminance. Contract: is_lit().
   double inverse_scale(uint32_t pixel) const { return inverse_[of(pixel)]; }
   /// Inverse brightness by tile, row by row; empty if no path contributed light.
   const std::vector<double>& inverse_scales() const { return inverse_; }

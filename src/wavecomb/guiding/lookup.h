@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Lookup and sampling of the guiding field. The definitions are in lookup.inl.
 ///
-/// The BSDF samples a bounce with probability a, the guiding field with 1 - a. In both cases, the
-/// density of the direction is the density of the mixture:
+/// The BSDF samples a bounce with probability a, the guiding field with 1 - a. Whichever of the two
+/// samples the direction, its density is the density of the mixture:
 ///   p(wi) = a p_bsdf(wi) + (1 - a) p_guide(wi)
 /// (one-sample model with the balance heuristic, Veach 1997, 9.2.4; path guiding: Vorba et al.
 /// 2014, Mueller et al. 2017). p_guide is constant in each of kGuidingBins bins of equal solid

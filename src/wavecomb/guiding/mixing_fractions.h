@@ -13,8 +13,8 @@ namespace wavecomb {
 inline constexpr std::array<float, 8> kBsdfShares = {0.25f, 0.35f, 0.45f, 0.55f,
                                                      0.65f, 0.75f, 0.85f, 1.f};
 
-/// Computes p / (a p_bsdf + (1 - a) p_guide) of a bounce for each a in kBsdfShares; 0 if the bounce
-/// was not recorded with the density of a guiding field.
+/// Computes p / (a p_bsdf + (1 - a) p_guide) of a bounce for each a in kBsdfShares. The results are
+/// 0 if the record contains no density of a guiding field.
 using ShareRatios = std::array<float, kBsdfShares.size()>;
 ShareRatios share_ratios(const TrainingRecord& r);
 
@@ -23,8 +23,8 @@ struct ShareMoments {
   std::array<double, kBsdfShares.size()> sums{};
   double count = 0;
 
-  /// Adds a bounce, whose `value` has been clamped. Ignores a bounce without the density of a
-  /// guiding field.
+  /// Adds a bounce, whose `value` the caller has clamped. Ignores bounces whose record contains no
+  /// density of a guiding field.
   void add(const ShareRatios& ratios, double value) {
     if (!(ratios[0] > 0)) return;
     const double squared = value * value;

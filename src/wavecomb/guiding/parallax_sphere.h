@@ -11,8 +11,8 @@
 /// (c / s^2) dA from o. For |o| < 1 the map from w to y is one-to-one.
 ///
 /// L. Ruppert, S. Herholz, H. P. A. Lensch, "Robust Fitting of Parallax-Aware Mixtures for Path
-/// Guiding", SIGGRAPH 2020, move the means of lobes in this way; a distribution in bins needs the
-/// map for all directions.
+/// Guiding", SIGGRAPH 2020, move only the means of lobes in this way. A distribution in bins needs
+/// the map for all directions.
 #pragma once
 
 #include "wavecomb/core/math.h"
@@ -49,7 +49,8 @@ struct CentreDirection {
   F factor;
 };
 
-/// Maps the direction w from the shading point at `offset` to the direction from the centre.
+/// Maps the direction w, as seen from the shading point at `offset`, to the direction as seen from
+/// the centre.
 template <typename F>
 inline CentreDirection<F> direction_from_centre(const Vec3<F>& offset, const Vec3<F>& w) {
   const F along = dot(offset, w);
@@ -58,8 +59,8 @@ inline CentreDirection<F> direction_from_centre(const Vec3<F>& offset, const Vec
   return {offset + w * s, s * s / c};
 }
 
-/// Maps the direction w from the centre to the direction from the shading point at `offset`: the
-/// inverse of direction_from_centre.
+/// Maps the direction w, as seen from the centre, to the direction as seen from the shading point
+/// at `offset`. The function is the inverse of direction_from_centre.
 template <typename F>
 inline Vec3<F> direction_from_point(const Vec3<F>& offset, const Vec3<F>& w) {
   return normalize(w - offset);

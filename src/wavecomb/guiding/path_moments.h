@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Expected cost and second moment of the bounces of a training path.
 ///
-/// Training paths have no Russian roulette, since its noise would make training samples unreliable.
-/// Instead, the effect of roulette on cost and variance is computed along each path, starting at
-/// its end. With q_j the survival probability after vertex j, r_j the ratio of throughputs after
-/// and before the bounce, and l_j the contribution of the bounce and the rest of the path for a
-/// throughput of 1, the expected cost and second moment are
+/// Training paths are traced without Russian roulette, because its noise would make training
+/// samples unreliable. Instead, the effect of roulette on cost and variance is computed along each
+/// path, starting at its end. With q_j the survival probability after vertex j, r_j the ratio of
+/// throughputs after and before the bounce, and l_j the contribution of the bounce and the rest of
+/// the path for a throughput of 1, the expected cost and second moment are
 ///   c_j = ray + vertex_{j+1} + q_{j+1} c_{j+1},
 ///   m_j = l_j^2 + r_j^2 (m_{j+1} / q_{j+1} - l_{j+1}^2).
 #pragma once

@@ -12,10 +12,10 @@
 namespace wavecomb {
 namespace {
 
-/// Candidates for the inverse radius of the parallax sphere, relative to the inverse of the
-/// harmonic mean hit distance.
+/// Candidates for the inverse radius of the parallax sphere, in units of the mean inverse hit
+/// distance.
 constexpr std::array<float, 4> kInverseDistances = {0.f, 0.5f, 1.f, 1.5f};
-/// Number of bounces with which the candidate radii are compared.
+/// Maximum number of bounces that are used to compare the candidate radii.
 constexpr size_t kTried = 2048;
 /// Standard deviation in radians of the blur of direction bins, and its cutoff in standard
 /// deviations.

@@ -18,17 +18,17 @@ using DirectionBins = std::array<double, kGuidingBins>;
 /// Returns the unit vector at the centre of a bin.
 Vec3<float> bin_direction(uint32_t bin);
 
-/// Training bounces of one region, which the caller owns.
+/// Training bounces of one region. The caller owns the records.
 using Bounces = std::span<const TrainingRecord* const>;
 
 /// Fits the sphere on which the incident light of a region is assumed to lie. The sphere's centre
 /// is the mean position of the bounces. The sphere's radius is the candidate whose direction bins
-/// have the largest sum of squares, that is, the most concentrated distribution. Candidates are
-/// multiples of the mean hit distance, because an opening such as a window is nearer than the
-/// surfaces that rays hit behind it. The value of each bounce is clamped to `cut`.
+/// have the largest sum of squares, that is, the most concentrated distribution. The candidates
+/// include radii below the mean hit distance, because an opening such as a window is nearer than
+/// the surfaces that rays hit behind it. The value of each bounce is clamped to `cut`.
 ParallaxSphere fit_sphere(Bounces bounces, double cut);
 
-/// Returns `count` of the bounces, at equal index intervals, or all bounces if there are at most
+/// Returns `count` bounces at equal index intervals, or all bounces if there are no more than
 /// `count`.
 std::vector<const TrainingRecord*> subset_of_bounces(Bounces bounces, size_t count);
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Efficiency-aware Russian roulette: survival by expected contribution and cost.
+/// Efficiency-aware Russian roulette, where the survival probability depends on the expected
+/// contribution and the expected cost.
 ///
 /// A path that survives with probability q, and is then weighted by 1 / q, adds T^2 X / q to the
 /// second moment of its pixel and c q to its cost. T is the throughput at the vertex; X and c are
@@ -40,11 +41,12 @@ struct BounceSample {
 /// Expected cost and variance of a camera path under roulette, or their means over paths.
 struct PathStatistics {
   double cost = 0;  ///< expected cost of a path, in rays
-  /// Variance that roulette adds to a path. In the mean over paths, this member is the total
-  /// variance of a path, divided by the squared brightness of the image.
+  /// In the statistics of a single path, this member is the variance that roulette adds. In the
+  /// mean over paths, it is the total variance of a path, divided by the squared brightness of the
+  /// image.
   double variance = 0;
-  /// Expected number of vertices with roulette, and expected number of vertices at which the path
-  /// survives roulette.
+  /// Expected number of vertices at which roulette is used, and expected number of these at which
+  /// the path survives.
   double vertices = 0, survivors = 0;
 };
 

@@ -14,8 +14,8 @@ struct TrainingRecord {
   float inverse_distance;
   uint32_t material;
   uint8_t axis;  ///< guiding_axis() of the surface normal
-  /// Radiance that returned along wi, times f |cos| over pdf: a one-sample estimate of the integral
-  /// of f L |cos| over directions, with L the incident radiance.
+  /// Radiance that the path received along wi, times f |cos| / pdf. This is a one-sample estimate
+  /// of the integral of f L |cos| over directions, where L is the incident radiance.
   float value;
   float pdf;          ///< density with which wi was sampled
   float bsdf_pdf;     ///< density of wi under the BSDF alone

@@ -53,7 +53,7 @@ struct LightPathBuffers {
   uint32_t* awaits_merge = nullptr;
 
   /// Initialises `PathState::ratio` of the camera paths in `slot` at their first hits: the number
-  /// of light paths for each sample of all pixels, divided by the density of camera paths.
+  /// of light paths per sample of the whole image, divided by the density of camera paths.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void begin_ratios(const LightPathContext& context,
                                                  const CameraSetup& camera, const UInt<F>& slot,

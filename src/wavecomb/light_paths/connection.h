@@ -3,9 +3,9 @@
 ///
 /// Bounces and light samples of camera paths leave a surface point p from one of two origins o_s,
 /// depending on their side (path/steps/light_connection.h). A light path from a point p' on a light
-/// or surface, however, arrives at p and not at o_s. To match the bounce of a camera path that hits
-/// p', the connection uses the ray from o_s to p', where rays of light paths start without the
-/// terminator offset.
+/// or surface, however, arrives at p instead of o_s. So that a connection matches the bounce of a
+/// camera path that hits p', it uses the ray from o_s to p', where rays of light paths start
+/// without the terminator offset.
 #pragma once
 
 #include "wavecomb/core/vec.h"

@@ -34,12 +34,13 @@ struct LightPathContext {
   /// If not null, `aim_samples` receives the contributions of light paths instead of the film.
   AimSamples* aim_samples = nullptr;
   bool connects = false;  ///< whether vertices of camera paths connect to vertices of light paths
-  /// 1 / N, where N is the number of light paths for each sample of all pixels.
+  /// 1 / N, where N is the number of light paths per sample of the whole image.
   float share = 1;
   float merge_scale = 0;  ///< ratio of the merge radius to the width of the path's ray cone
-  /// If 0, light splats hold radiance. In some pilot renders, `camera_squares` is the brightness of
-  /// the scene, and light splats hold a variance divided by this brightness: the variance that a
-  /// pixel sample would have if only camera paths sampled the light of the splat (light_vertex.h).
+  /// 0 means that light splats hold radiance. In some pilot renders, `camera_squares` is the
+  /// brightness of the scene, and light splats hold a variance divided by this brightness: the
+  /// variance that a pixel sample would have if only camera paths sampled the light of the splat
+  /// (light_vertex.h).
   float camera_squares = 0;
 
   /// Returns whether the render has light paths.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Coupling of camera paths to light paths, a joint transport (path/joint_transport.h).
+/// Coupling of camera paths to light paths, which is a joint transport (path/joint_transport.h).
 #pragma once
 
 #include "wavecomb/aov/path_aovs.h"

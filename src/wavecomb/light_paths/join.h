@@ -23,7 +23,7 @@
 ///   E_i = d^2 / p->_i   (d is the distance)
 /// replaces p<-_i+1 and all earlier factors of R:
 ///   R_n = |g l_n| / (|g w_n| p->_n) (R_n-1 p<-_n + E_n-1).
-/// The term E_i is 0 if one of the two connected vertices scatters as a delta, if light paths
+/// The term E_i is 0 if one of the two connected vertices scatters by a delta lobe, if light paths
 /// cannot reach x_i+1, or if the viewer is inside an absorbing material.
 ///
 /// With merging, camera paths whose bounces were all deltas have a different third technique: a
@@ -45,8 +45,8 @@ namespace wavecomb {
 
 inline constexpr float kMaxRatio = 1e30f;
 
-/// Returns the lanes whose delta transmission has different densities in the two directions, as in
-/// layered materials.
+/// Returns the lanes whose delta transmission has different densities in the two directions of the
+/// light, as in layered materials.
 template <typename Bsdf, typename F>
 inline Mask<F> is_asymmetric(const Bsdf& bsdf, const Vec3<F>& wo, const Vec3<F>& wi) {
   if constexpr (requires { bsdf.is_layered(); })

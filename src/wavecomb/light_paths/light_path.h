@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Start of light paths. Light paths are numbered like the pixels of the image, and a pass traces
 /// the same number of samples of each light path. Random numbers depend only on the path's number
-/// and the sample, not on the schedule.
+/// and the sample index, not on scheduling.
 #pragma once
 
 #include "wavecomb/core/sampler.h"
@@ -18,8 +18,8 @@
 namespace wavecomb {
 
 /// Start of a light path. `eta_scale` is one over the largest component of the initial flux, so
-/// that roulette, which multiplies `eta_scale` by the flux, uses the remaining fraction of the
-/// flux.
+/// that roulette, which multiplies the flux by `eta_scale`, depends on the fraction of the flux
+/// that remains.
 template <typename F>
 struct LightPath {
   SampleKey<F> key;
@@ -120,14 +120,14 @@ template <typename F>
 struct LightVertexResult {
   VertexResult<F> v;
   LightPathState<F> next;  ///< state of the light path after the bounce, in addition to v.next
-  /// Film position in pixels of the contribution, if there is a shadow ray.
+  /// Position of the contribution on the film, in pixels. Valid only if there is a shadow ray.
   F x, y;
   Vec3<F> p;             ///< position of the light path's vertex
   Mask<F> is_candidate;  ///< whether vertices of camera paths may connect to the vertex
 };
 
-/// Vertices of camera paths to which vertices of light paths connect. Without a connection target,
-/// vertices of light paths connect to the camera.
+/// Vertices of camera paths to which vertices of light paths are connected. Where shading takes no
+/// such target, vertices of light paths are connected to the camera.
 template <typename F>
 struct ConnectionTarget {
   ConnectionRow<F> row;

@@ -6,7 +6,7 @@
 namespace wavecomb {
 namespace {
 
-/// Parts of a light splat, one for each light path expression that matches the path.
+/// Parts of a light splat. Each light path expression that matches the path has one part.
 struct LightSplatParts {
   uint32_t found = 0;  ///< bit k is set if light path expression k has a part
   std::array<Color<float>, PathAutomaton::kMaxExpressions> light{};

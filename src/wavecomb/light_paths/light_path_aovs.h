@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// AOV values of light paths, and the state from which they are computed: the light that emitted
-/// the path (in its PathRow), the number of scatterings and, for light path expressions, a state of
-/// BackwardAutomaton for each colour.
+/// AOV values of light paths, and the state from which they are computed. The state consists of the
+/// light that emitted the path (in the PathRow), the number of scatterings and, for light path
+/// expressions, a state of BackwardAutomaton for each colour.
 ///
 /// Lobes are classified as on camera paths (path_expressions.h). A bounce counts as diffuse with a
 /// probability equal to its diffuse fraction, otherwise as glossy; all colours use the same random
@@ -83,7 +83,7 @@ class LightPathAovs {
 
   /// Returns whether any AOV layer needs contributions of light paths.
   explicit operator bool() const { return layout_.count > 0; }
-  /// Returns whether the scattering events of vertices must be classified.
+  /// Returns whether shading must classify the scattering events of vertices.
   bool wants_events() const { return backward_ != nullptr; }
   size_t bytes() const { return states_.bytes() + connections_.bytes(); }
 
@@ -117,8 +117,8 @@ class LightPathAovs {
         active);
   }
 
-  /// Stores the automaton states of the last shaded vertex of each light path for connections,
-  /// since camera paths connect to this vertex.
+  /// Stores the automaton states of the last shaded vertex of each light path, since camera paths
+  /// connect to this vertex.
   template <typename F>
   [[gnu::noinline, gnu::cold]] void mark_stored(const UInt<F>& slot, const Mask<F>& active) const {
     const UInt<F> states = load_row<LightPathStateRow, F>(states_.rows, slot, active).splat_states;

@@ -14,8 +14,8 @@ namespace wavecomb {
 template <typename F>
 struct LightPathState {
   F mis_sum{0.f};  ///< sum S of density ratios for MIS weights (light_vertex.h)
-  /// Density of the previous bounce, or 0 if the vertex of this bounce cannot be connected to
-  /// camera paths.
+  /// Density of the previous bounce, or 0 if the vertex where this bounce started cannot be
+  /// connected to camera paths.
   F bounce_pdf{0.f};
   UInt<F> light{0u};  ///< light at which the path started
 };
@@ -36,8 +36,8 @@ struct LightPathRow {
   LightPathState<F> light_state() const { return {mis_sum, bounce_pdf, light}; }
 };
 
-// Wave stages that trace rays and use random numbers read camera paths and light paths in the same
-// way.
+// Rows of light paths and camera paths have the same size and the same offsets of common fields, so
+// that wave stages that trace rays or use random numbers can process both.
 static_assert(kFieldWords<LightPathRow> == kFieldWords<PathRow>);
 static_assert(offsetof(LightPathRow<float>, throughput) == offsetof(PathRow<float>, throughput) &&
               offsetof(LightPathRow<float>, eta_scale) == offsetof(PathRow<float>, eta_scale) &&

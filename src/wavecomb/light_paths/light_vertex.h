@@ -48,7 +48,7 @@ namespace wavecomb {
 
 namespace detail {
 
-/// Lower bound for the density of camera paths relative to light paths.
+/// Lower bound of the ratio of the density of camera paths to that of light paths.
 inline constexpr float kMinRatio = 1e-9f;
 /// Minimum cosine between the normals of a merge point and of a vertex that is merged with it.
 inline constexpr float kMinNormalCosine = 0.7f;
@@ -69,7 +69,7 @@ struct LightPathPoint {
 
   /// Returns the ratio |g w| / |g l| of cosines for a world direction w.
   F cosine_ratio(const Vec3<F>& w) const { return abs(dot(at.s.ng, w)) * inverse_cos; }
-  /// Returns the density of camera paths: the density `bounce` plus that of light samples.
+  /// Returns the density of camera paths, where `bounce` is the density of their bounces.
   F camera_density(const F& bounce) const {
     return select(by_light_only, F(0.f), bounce) + sampled;
   }
@@ -87,7 +87,7 @@ WAVECOMB_INLINE LightPathPoint<Bsdf, F, Interaction> light_path_point(const Vert
                                                                       const Mask<F>& is_first) {
   const Vec3<F> back = -v.path.dir;
   const F cosine = abs(dot(at.s.ng, back));
-  // Use the ray on which the bounce of a camera path would hit the previous vertex.
+  // Use the ray along which a bounce of a camera path would hit the previous vertex.
   Connection<F> c = connect_to_point<F>(at, v.path.o);
   const Mask<F> from_infinite =
       is_first & Mask<F>(from.light < UInt<F>(v.scene.lights.infinite_count));
@@ -220,7 +220,7 @@ WAVECOMB_INLINE void connect_vertex_to_camera(const Vertex<F, kFeatures>& v,
   record_scattering<F>(v, path_point, viewer);
 }
 
-/// Merges a vertex of a light path with nearby points that the camera sees in mirrors and through
+/// Merges a vertex of a light path with nearby points that the camera sees in mirrors or through
 /// glass (merge_point.h). Each lane processes its points one after the other.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename PathPoint>
 WAVECOMB_INLINE void merge(const Vertex<F, kFeatures>& v, const LightPathSetup& setup,

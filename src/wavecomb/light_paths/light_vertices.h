@@ -2,8 +2,9 @@
 /// Vertices of light paths to which camera paths connect (docs/light-paths.md).
 ///
 /// Each camera path is paired with the light path of the same pixel number and sample. One vertex
-/// of the light path is stored, chosen uniformly, and every vertex of the camera path connects to
-/// it. The connections depend only on pixel and sample, not on the wave.
+/// of the light path, chosen uniformly, is stored, and every vertex of the camera path connects to
+/// this vertex. The connections depend only on pixel and sample, not on the assignment of paths to
+/// waves.
 #pragma once
 
 #include <cstring>
@@ -27,15 +28,14 @@ struct LightVertexRow {
   WAVECOMB_FIELDS(p, vertices, depth, material)
 };
 
-/// Connection that a vertex of a camera path offers to the stored vertex of a light path; each slot
-/// has one row.
+/// Connection from a camera path vertex to the stored light path vertex, one row for each slot.
 template <typename F>
 struct ConnectionRow {
   Vec3<F> from;  ///< origin of the ray to the light path's vertex
   /// Solid angle density of a bounce of the camera path towards the light path's vertex.
   F pdf;
   /// Contribution to the pixel for unit radiance from the light path's vertex, times the number of
-  /// candidate vertices; black without a connection.
+  /// candidate vertices; black if there is no connection.
   Color<F> light;
   F ratio;  ///< JointVertex::towards
   WAVECOMB_FIELDS(from, pdf, light, ratio)
@@ -76,7 +76,7 @@ class LightVertices {
   SoaBlock rows_;
 };
 
-/// Stores the vertex at `p` in the lanes of `is_candidate` that a hash of the path selects: the
+/// In the lanes of `is_candidate`, stores the vertex at `p` if a hash of the path selects it: the
 /// n-th candidate vertex replaces the stored vertex with probability 1 / n (reservoir sampling).
 /// Returns the lanes whose vertex was stored.
 template <typename F>
@@ -101,7 +101,7 @@ inline Mask<F> store_light_vertex(const LightVertices& to, uint32_t depth,
   return replaces;
 }
 
-/// Connection that a vertex of a camera path offers to a vertex of a light path.
+/// Connection from a vertex of a camera path to a vertex of a light path.
 template <typename F>
 struct ConnectionOffer {
   Vec3<F> to;  ///< position of the light path's vertex
@@ -116,9 +116,9 @@ struct ConnectionOffer {
   ScatteringEvent<F> scattering{};
 };
 
-/// Prepares the connection of the vertices at `depth` of the camera paths in `slot` to the light
-/// path vertices stored for these slots. The contribution in the returned offer is black;
-/// `offer_connection()` computes it.
+/// For the camera paths in `slot`, prepares the connections from their vertices at `depth` to the
+/// light path vertices stored for these slots. The returned contribution is black until
+/// `offer_connection()` computes the actual value.
 template <typename F>
 inline ConnectionOffer<F> offer_for(const LightVertices& from, const UInt<F>& slot, uint32_t depth,
                                     uint32_t max_depth, const Mask<F>& active) {

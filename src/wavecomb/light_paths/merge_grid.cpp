@@ -13,8 +13,8 @@
 namespace wavecomb {
 namespace {
 
-/// Range of the binary exponents of merge radii, and exponent of the ratio of cell size to radius.
-/// The sphere of a point overlaps at most two cells along each axis.
+/// Range of the binary exponents of merge radii. The cells for radii with exponent e have the size
+/// 2^(e + kCellExponent), so the sphere of a point overlaps at most two cells along each axis.
 constexpr int kMinExponent = -60, kMaxExponent = 60, kCellExponent = 2;
 constexpr size_t kChunk = 8192;
 
@@ -101,8 +101,7 @@ bool MergeGrid::Search::next(uint32_t& pixel) {
       pixel = grid_->entries_[begin_++];
       const float* row = grid_->points_ + size_t{pixel} * kMergePointWords;
       const float dx = at_[0] - row[0], dy = at_[1] - row[1], dz = at_[2] - row[2];
-      // A hash bucket also holds points of different cells and of different radius levels with the
-      // same hash.
+      // A hash bucket may also hold points of other cells and of other radius levels.
       if (dx * dx + dy * dy + dz * dz < row[3] * row[3] &&
           exponent_of(row[3]) == grid_->levels_[level_ - 1])
         return true;

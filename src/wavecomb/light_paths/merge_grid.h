@@ -12,8 +12,8 @@
 
 namespace wavecomb {
 
-/// Hash grid of merge points. Each point is stored in the cells that the sphere of its radius
-/// overlaps. The cell size depends on the radius of the point.
+/// Hash grid of merge points. Each point is stored in all cells that overlap the sphere of its
+/// merge radius. The cell size depends on the radius of the point.
 ///
 /// Contract: build() must not run during searches.
 class MergeGrid {
@@ -22,7 +22,7 @@ class MergeGrid {
   void build(std::span<const float> points);
   const float* points() const { return points_; }
 
-  /// Iterates over the merge points whose radius exceeds their distance to a given position.
+  /// Iterates over all merge points whose sphere contains a given position.
   class Search {
    public:
     Search() = default;

@@ -2,15 +2,16 @@
 /// Points that the camera sees in mirrors and through glass, for merging with light paths
 /// (docs/light-paths.md, "Merging").
 ///
-/// A camera path whose bounces so far were all deltas (at least one) stores a point at its first
-/// vertex with a non-delta lobe. A light path cannot connect to the camera through a mirror.
-/// Instead, a light path with a vertex within a distance r of the point is treated as if it ended
-/// at the point; r is given in pixels. Merge points are the visible points of progressive photon
-/// mapping (T. Hachisuka et al., "Progressive Photon Mapping", 2008). Contributions at merge points
-/// are added to their pixels as integers, so the order of additions does not matter.
+/// A camera path stores a merge point at its first vertex with a non-delta lobe, if it has had at
+/// least one bounce and only delta bounces. A light path cannot connect to the camera through a
+/// mirror. Instead, a light path with a vertex within a distance r of the merge point is treated as
+/// if it ended at the merge point. The setting gives r in pixels. Merge points are the visible
+/// points of progressive photon mapping (T. Hachisuka et al., "Progressive Photon Mapping", 2008).
+/// Contributions at merge points are added to their pixels as integers, so the order of additions
+/// does not matter.
 ///
-/// With merging, a pass has one sample for each pixel, which stores at most one point. The light
-/// paths of the pass are traced after all its camera paths.
+/// With merging, a pass has one sample for each pixel, and each sample stores at most one point.
+/// The light paths of the pass are traced after all its camera paths.
 #pragma once
 
 #include <cstring>

@@ -34,8 +34,8 @@ LightPathConflict light_path_conflict(const Scene& scene);
 /// Throws Error if the scene has a feature that light paths do not support.
 void check_light_paths(const Scene& scene, const Settings& settings);
 
-/// Returns an estimate of the scene's mean radiance, under the assumption that all light power
-/// arrives at its surfaces, times the camera's exposure and rounded up to a power of two.
+/// Returns an estimate of the scene's mean radiance times the camera's exposure, rounded up to a
+/// power of two. The estimate assumes that all light power arrives at the scene's surfaces.
 float scene_brightness(const Scene& scene);
 /// Returns the fixed-point unit of light splats: scene_brightness() / 2^44. Splats therefore keep
 /// at least 20 bits of contributions above 2^-24 times the scene brightness, and can represent up
@@ -48,15 +48,15 @@ LightSplatFilter make_light_splat_filter(const CameraSetup& camera, const Filter
                                          const Region& rendered, bool one_pixel = false);
 
 /// Enables light paths for the lights of `view`: sets the bounding sphere of all surfaces, and the
-/// distance from its centre at which light paths of infinite lights start, in front of all light
-/// shapes.
+/// distance from its centre at which light paths of infinite lights start. A sphere with this
+/// radius also contains all light shapes.
 void send_paths(const Scene& scene, LightView& view);
 
 /// Returns whether any light of the scene emits light paths.
 bool emits_paths(const Scene& scene);
 
-/// Returns the names of the lights that emit no light paths. Only camera paths find the light of
-/// these lights.
+/// Returns the names of the lights that emit no light paths. Only camera paths sample the emission
+/// of these lights.
 std::vector<std::string> lights_without_paths(const Scene& scene);
 
 }  // namespace wavecomb

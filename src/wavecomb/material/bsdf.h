@@ -60,7 +60,7 @@ struct BsdfTraits {
                                                     ///< of Gaussian splats
   /// Whether the BSDF describes scattering by a whole fibre. The x axis of the local frame then
   /// lies along the fibre (geometry/hit/fibre_frame.h), and the surface has no inner side. Such a
-  /// BSDF is not reciprocal, so light paths exclude it.
+  /// BSDF is not reciprocal, so light paths do not support it.
   static constexpr bool kOnFibre = false;
 
   /// Returns the values that depend only on wo, which functions such as eval() take as input. By
@@ -92,15 +92,15 @@ struct BsdfSample {
   Mask<F> is_delta;
   /// Relative index of refraction across the surface (eta_t / eta_i); 1 for reflection and for
   /// straight transmission. Refraction scales the throughput by 1 / eta^2. Russian roulette
-  /// multiplies by `eta`^2 to ignore this scaling.
+  /// multiplies by `eta`^2 to cancel this scaling.
   F eta;
   /// Perceptual roughness of the sampled lobe (1 for diffuse lobes), which widens the ray cone.
   F roughness;
 };
 
-/// Base class of BSDFs whose view() returns more than `wo`. Adds overloads of delta_probability(),
-/// eval(), diffuse_f_cos() and sample() that take `wo` and call view(). Derived classes import the
-/// overloads by using-declarations.
+/// Base class of BSDFs whose view() returns more values than `wo`. Adds overloads of
+/// delta_probability(), eval(), diffuse_f_cos() and sample() that take `wo` and call view().
+/// Derived classes import the overloads by using-declarations.
 template <typename Bsdf, typename F>
 struct ViewedBsdf : BsdfTraits {
   F delta_probability(const Vec3<F>& wo) const { return self().delta_probability(self().view(wo)); }
@@ -145,7 +145,7 @@ struct ShadingParams {
   UInt<F> flags;
 };
 
-/// Material inputs at a hit, and in `own` the program-specific parameters, in the order of the
+/// Material inputs at a hit. `own` holds the program-specific parameters, in the order of the
 /// program's row in material/description/programs.h.
 template <typename F>
 struct SpecificShadingParams : ShadingParams<F> {

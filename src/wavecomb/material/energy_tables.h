@@ -25,8 +25,8 @@ class EnergyTables {
   /// (eta - 1) / (eta + 1) of the last index node, for eta = kMaxIor = 10.
   static constexpr float kLastIndex = 9.f / 11.f;
   static constexpr uint32_t kPlane = kCosines * kRoughnesses, kVolume = kPlane * kIndices;
-  /// Number of nodes of a quadrature rule. Each node takes two planes of the table: the square root
-  /// of the cosine, and the weight.
+  /// Number of nodes of a quadrature rule. Each node uses two planes of the table, one for the
+  /// square root of the cosine and one for the weight.
   static constexpr uint32_t kRule = 6, kRuleAt = kPlane + 3 * kVolume;
   /// Number of table nodes of anisotropic surfaces along |cos phi|, sqrt(alpha_y / alpha_x) and
   /// sqrt(alpha_x). The nodes along sqrt(cosine) are the same as for isotropic surfaces.

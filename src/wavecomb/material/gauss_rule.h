@@ -18,7 +18,7 @@ struct PointMass {
 /// [0, 1], weights >= 0), which integrates polynomials of degree below 2 n exactly. Nodes are the
 /// roots of the orthogonal polynomial of degree n, built by the Stieltjes procedure (Gautschi,
 /// "Orthogonal Polynomials: Computation and Approximation", 2004, section 2.2.3). If the points
-/// nearly coincide, all n nodes are their mean.
+/// nearly coincide, all n nodes are equal to the mean of the points.
 template <size_t n>
 inline std::array<PointMass, n> gauss_rule(const std::vector<PointMass>& points) {
   // Recurrence of the orthogonal polynomials: p_(k+1) = (x - a_k) p_k - b_k p_(k-1), with norm_k =

@@ -45,9 +45,9 @@ inline Vec3<F> valid_normal(const Vec3<F>& n) {
   return select<F>(valid, up * inv, Vec3<F>(F(0.f), F(0.f), F(1.f)));
 }
 
-/// Runs the graphs of the active lanes, each of which must have one, and writes their outputs to
-/// `p`. Outputs that only "openpbr" reads are skipped. This function is never inlined, so that
-/// materials without graphs do not pay for its registers.
+/// Runs the graphs of the active lanes, whose materials must all have a graph, and writes the
+/// outputs to `p`. Outputs that only "openpbr" reads are skipped. This function is never inlined,
+/// so that its registers cost nothing for materials without graphs.
 template <typename F, typename Params>
 [[gnu::noinline]] void drive_parameters(const MaterialView& view, const UInt<F>& material,
                                         const GraphPoint<F>& at, const Mask<F>& active, Params& p) {

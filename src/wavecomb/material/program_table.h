@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Definitions of all programs, for tests. Kernels are compiled for one program at a time.
+/// Definitions of all programs, for tests. Kernels do not need this header, since each is compiled
+/// for a single program.
 #pragma once
 
 #include "wavecomb/material/program_list.h"

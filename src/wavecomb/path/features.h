@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Optional features of vertex kernels (kernel_matrix.h). General kernels are compiled with all
-/// features, and plain kernels only with the features that simple scenes need. A joint transport is
-/// not a feature flag, since kernels select it by a template type (joint_transport.h).
+/// features. Plain kernels have only the features that simple scenes need. There is no feature flag
+/// for a joint transport, since kernels select it by a template type (joint_transport.h).
 #pragma once
 
 #include <cstdint>

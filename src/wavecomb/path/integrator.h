@@ -14,27 +14,27 @@ class PhaseClock;
 struct CoherenceCounts;
 struct Counts;
 
-/// Task of a worker: to trace the samples [first_sample, first_sample + samples) of `pixels`. A
-/// pixel is encoded as x | y << 16.
+/// Task of a worker: trace the samples [first_sample, first_sample + samples) of `pixels`. A pixel
+/// is encoded as x | y << 16.
 struct WaveTask {
   const uint32_t* pixels;
   uint32_t pixel_count;
   uint32_t first_sample;
   uint32_t samples;
   /// Whether to trace paths of the joint transport (joint_transport.h) instead of camera paths.
-  /// Pixel and sample are then only the index of a path, which may contribute to any pixel.
+  /// Pixel and sample then only identify a path, which may contribute to any pixel.
   bool joint = false;
   uint32_t path_count() const { return pixel_count * samples; }
 };
 
 /// Statistics and training data of a worker. A pointer is null if the integrator does not collect
-/// the data. All members except `counts` may be read only while the worker is idle; the worker's
-/// thread may read `counts` at any time.
+/// the data it points to. All members except `counts` may be read only while the worker is idle;
+/// the worker's thread may read `counts` at any time.
 struct WorkerView {
   const PhaseClock* clock = nullptr;
   const Counts* counts = nullptr;
   const CoherenceCounts* coherence = nullptr;
-  const Chooser* policies = nullptr;  ///< how often the worker used each policy
+  const Chooser* policies = nullptr;  ///< number of times the worker used each policy
   CostTracker* costs = nullptr;
   size_t bytes = 0;  ///< size of the worker's buffers
 };

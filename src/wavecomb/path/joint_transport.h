@@ -13,8 +13,8 @@
 ///   where R' is R with p_light in place of p_bounce.
 ///   Each vertex multiplies its factors into R (PathState::ratio), which is 0 where the joint
 ///   transport does not reach.
-/// - The joint transport receives each camera path vertex between its light sample and its bounce,
-///   and may store the vertex, for example to connect other vertices to it.
+/// - The joint transport receives each camera path vertex after the light sample and before the
+///   bounce. It may store the vertex, for example to connect other vertices to the stored one.
 ///
 /// A joint transport is a class with three member types:
 ///
@@ -41,7 +41,7 @@ struct FirstHit {
   F time;          ///< shutter time, if the camera moves
 };
 
-/// Coupling for renders without a joint transport, whose functions do nothing. The functions are
+/// Coupling for renders without a joint transport. The functions do nothing. The functions are
 /// called in the order in which they are declared.
 template <typename F>
 struct NoCoupling {
@@ -53,8 +53,8 @@ struct NoCoupling {
             const Mask<F>& /*active*/, PathState<F>& /*state*/) {}
 
   /// Returns the MIS weight of the emission that the paths hit at vertex `v`. `light` is the
-  /// emitter in the lanes `known`, and `weight` the weight without the joint transport, against
-  /// light samples with density `light_pdf`.
+  /// emitter, if the lane is in `known`. `weight` is the MIS weight without the joint transport,
+  /// against light samples with density `light_pdf`.
   template <typename V>
   F emission_weight(const V& /*v*/, const UInt<F>& /*light*/, const Mask<F>& /*known*/,
                     const F& /*light_pdf*/, const F& weight) const {
@@ -74,7 +74,7 @@ struct NoCoupling {
     return weight;
   }
 
-  /// Passes the vertex to the joint transport, which may store it.
+  /// Passes the vertex to the joint transport, which may store the vertex.
   template <typename Context>
   void offer(const Context& /*c*/) {}
 
@@ -84,8 +84,8 @@ struct NoCoupling {
               PathState<F>& /*next*/) {}
 
   /// Stores the ratios R, and the vertices that were passed to offer(). `next` is the state of the
-  /// paths in the lanes `alive`, which continue. `aovs` are the AOV values of the wave, which do
-  /// not include this vertex yet.
+  /// paths that continue, in the lanes `alive`. `aovs` are the AOV values of the wave, which do not
+  /// include this vertex yet.
   template <typename Aovs>
   void store(const UInt<F>& /*slot*/, const PathState<F>& /*next*/, const Mask<F>& /*alive*/,
              const Aovs& /*aovs*/, const Mask<F>& /*active*/) const {}

@@ -26,11 +26,11 @@
 ///   void attenuate_shadow_rays(Wave&, uint32_t depth, SamplerKind) const;  for free shadow rays
 ///   Color<F> shadow_transmittance(const Wave&, size_t ray) const;
 ///
-/// A shading program separate from those of surfaces shades events in volumes
-/// (BsdfTraits::kOnSurface is false).
+/// Events in volumes are not shaded by surface programs but by a separate program, whose
+/// BsdfTraits::kOnSurface is false.
 ///
 /// Contract: the result of a lane depends only on its own segment, and random numbers come only
-/// from VertexSet::kFlight and kShadow, so that the schedule has no effect.
+/// from VertexSet::kFlight and kShadow, so that the order of processing has no effect.
 #pragma once
 
 #include "wavecomb/core/sampler.h"

@@ -112,10 +112,10 @@ class PathHistory {
 
 /// Receiver of the vertices of finished paths.
 ///
-/// Contract: all workers call the receiver concurrently, once for each wave (the reference
-/// integrator once for each path). The arguments are valid only during the call. Since workers call
-/// in any order, implementations must add up values as integers to be deterministic
-/// (core/encoding/fixed_point.h).
+/// Contract: all workers call the receiver concurrently. Calls are made once for each wave or, by
+/// the reference integrator, once for each path. The arguments are valid only during the call.
+/// Since workers call in any order, implementations must add up values as integers to be
+/// deterministic (core/encoding/fixed_point.h).
 class HistoryReader {
  public:
   virtual ~HistoryReader() = default;

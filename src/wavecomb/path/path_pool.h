@@ -18,15 +18,15 @@ struct RayHead {
   WAVECOMB_FIELDS(o, d)
 };
 
-/// Subsurface body that a ray enters, where it starts a random walk.
+/// Subsurface body that a ray enters to start a random walk.
 template <typename F>
 struct BodyEntry {
   UInt<F> body{0u};    ///< object_of() of the body
   UInt<F> normal{0u};  ///< packed normal at the entry, outwards
 };
 
-/// Stored state of a camera path between two vertices. Shading a vertex reads the row and replaces
-/// its contents by the next ray.
+/// Stored state of a camera path between two vertices. Shading of a vertex reads the row and
+/// replaces its contents by the next ray.
 ///
 /// A ray that enters a subsurface body (enters_body()) uses neither a cone nor a receiver. The row
 /// then stores the BodyEntry in the words of the cone and the receiver, and marks this layout by
@@ -35,7 +35,7 @@ template <typename F>
 struct PathRow {
   Vec3<F> o, d;  ///< the ray to trace
   Color<F> throughput;
-  /// Density of the ray's direction when it was sampled; 0 for a delta bounce or camera ray.
+  /// Density with which the ray's direction was sampled; 0 for a delta bounce or camera ray.
   F pdf;
   F eta_scale;                ///< product of eta^2 over all refractions of the path, for roulette
   F cone_width, cone_spread;  ///< ray cone at the origin: width in scene units, spread in radians
@@ -50,8 +50,8 @@ struct PathRow {
     cone_width = select(lanes, bits_float<F>(entry.normal), cone_width);
     receiver = select(Mask<UInt<F>>(lanes), entry.body, receiver);
   }
-  /// Returns the entry into the body, removes the mark, and sets the cone width to 0. `receiver`
-  /// keeps the body, because the ray queries of the random walk read it.
+  /// Returns the entry into the body, removes the mark, and sets the cone width to 0. The field
+  /// `receiver` still holds the body, because the ray queries of the random walk read this field.
   BodyEntry<F> take_entry() {
     const BodyEntry<F> entry{receiver, float_bits<F>(cone_width)};
     pdf = abs(pdf);
@@ -60,7 +60,7 @@ struct PathRow {
   }
 };
 
-/// Path state that only some scenes need.
+/// Fields of the path state that only some scenes need.
 template <typename F>
 struct PathColdRow {
   F time;        ///< shutter time in [0, 1)
@@ -82,7 +82,7 @@ template <typename F>
 struct MediumStackRow {
   UInt<F> object_0, object_1, object_2, object_3, material_0, material_1, material_2, material_3;
   UInt<F> object;   ///< instance_geometry() of the vertex
-  UInt<F> crossed;  ///< Crossing bits and the material, as shading the vertex determined them
+  UInt<F> crossed;  ///< Crossing bits and the material, set by shading
   F outer;          ///< PathState::outer and PathState::medium of the vertex
   UInt<F> medium;
   WAVECOMB_FIELDS(object_0, object_1, object_2, object_3, material_0, material_1, material_2,
@@ -109,7 +109,7 @@ struct ShadowHead {
   WAVECOMB_FIELDS(o, d, tfar, direct)
 };
 
-/// Radiance of a path, or of one component of it.
+/// Radiance of a path, or one component of the radiance.
 template <typename F>
 struct RadianceRow {
   Color<F> sum;
@@ -122,15 +122,16 @@ static_assert(kIsHead<RayHead, PathRow> && kIsHead<RayHead, ShadowRow>);
 
 /// Path state of one wave. Each slot belongs to one sample of a pixel until its path ends. The
 /// state of a path is a row of one cache line, and the shadow ray is a second row, so that shading
-/// reads only the cache lines of the paths whose hits it processes, in whatever order
+/// reads only the cache lines of the paths that it processes, in any order
 /// (docs/decisions/path-rows.md).
 ///
 /// Contract: owned by one wave.
 class PathPool {
  public:
   PathPool() = default;
-  /// Allocates `capacity` slots. The flags add optional rows: `cold` PathColdRow, `nested`
-  /// MediumStackRow, `shaded` VertexResult::shadow_tint, `split` PathState::diffuse.
+  /// Allocates `capacity` slots. Each flag adds an optional row: `cold` adds PathColdRow, `nested`
+  /// adds MediumStackRow, `shaded` adds VertexResult::shadow_tint, and `split` adds
+  /// PathState::diffuse.
   PathPool(size_t capacity, bool cold, bool nested = false, bool shaded = false, bool split = false)
       : rows_(1, capacity * (kRowWords<PathRow> + kRowWords<ShadowRow> + kRadianceWords)),
         cold_(cold ? SoaBlock(1, capacity * kRowWords<PathColdRow>) : SoaBlock()),

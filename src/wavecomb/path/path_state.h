@@ -112,8 +112,8 @@ WAVECOMB_INLINE PathRow<F> path_row(const PathState<F>& next, const SampleKey<F>
   return row;
 }
 
-/// Result of shading one vertex. Lanes that are not set in `has_shadow` or `alive` have undefined
-/// values in the fields of the shadow ray or of the next ray.
+/// Result of shading one vertex. The fields of the shadow ray are undefined in lanes outside
+/// `has_shadow`, and the fields of the next ray are undefined in lanes outside `alive`.
 template <typename F>
 struct VertexResult {
   Color<F> emitted;    ///< emission to add to the path's radiance, already clamped
@@ -127,8 +127,8 @@ struct VertexResult {
       shadow_tint;
   Mask<F> alive;      ///< whether the path continues
   PathState<F> next;  ///< ray and state of the next path segment
-  // For training of the guiding field, if Vertex::guide is set: guiding_axis of the surface, and
-  // density of the bounce by the BSDF alone.
+  // Values for training the guiding field, set if Vertex::guide is not null: guiding_axis of the
+  // surface, and the bounce density of the BSDF alone.
   UInt<F> axis;
   F bsdf_pdf;
   UInt<F> crossed;  ///< MediumStackRow::crossed, if the scene has nested dielectrics
@@ -144,8 +144,9 @@ struct ScatteringEvent {
   Mask<F> is_delta{false};
 };
 
-/// AOV values of a vertex. The steps of a vertex write AOVs directly instead of returning them:
-/// most renders have no AOVs, and values that live until the end of shading would occupy registers.
+/// AOV values of a vertex. The steps of a vertex write AOVs directly instead of returning AOV
+/// values: most renders have no AOVs, and values that are needed until the end of shading would
+/// occupy registers.
 template <typename F>
 struct VertexAovs {
   /// Flags of optional fields. Fields without a flag are always written.
@@ -155,13 +156,14 @@ struct VertexAovs {
   Vec3<F> normal;
   Mask<F> is_clear;  ///< whether the surface has only delta lobes, such as a mirror or glass
   Vec2<F> uv;
-  UInt<F> emitter, light_id;  ///< lights that contribute `emitted` and `direct`, or kNoLight
+  /// Light that contributes `emitted` and light that contributes `direct`, or kNoLight.
+  UInt<F> emitter, light_id;
   // With wants_lights: the position from which a light was sampled, and the MIS weight that
   // `direct` contains. A weight of -1 means that no light was sampled.
   Vec3<F> light_position;
   F light_weight;
-  // With wants_events: classification of the scattering of the light sample and of the bounce
-  // (path/steps/note_events.h).
+  // With wants_events: classification of the scattering towards the light sample and along the
+  // bounce (path/steps/note_events.h).
   ScatteringEvent<F> light_scattering, bounce;
   // With wants_bounces: the probability that the guiding field sampled the direction of the bounce,
   // and the survival probability of roulette. A survival of -1 means that there was no bounce.
@@ -175,13 +177,14 @@ struct Guides {
   Vec3<F> normal;
 };
 
-/// Returns the denoiser inputs at a vertex: albedo, tinted by the mirrors and glass before it, and
-/// normal. If `is_clear` is set, the values of the next vertex replace these values.
+/// Returns the denoiser inputs at a vertex: normal and albedo, where the albedo is tinted by the
+/// mirrors and glass that the path has met before. If `is_clear` is set, the values of the next
+/// vertex replace these values.
 template <typename F>
 inline Guides<F> guides_of(const VertexAovs<F>& v, const PathState<F>& path) {
   const auto tinted = [&](const F& albedo, const F& throughput) {
-    // eta_scale removes the radiance scaling at refractions. The minimum is needed because roulette
-    // may have increased the throughput.
+    // eta_scale removes the radiance scaling at refractions. The limit of 1 is needed because
+    // roulette may have increased the throughput.
     return F(min(F(albedo * throughput * path.eta_scale), F(1.f)));
   };
   return {{tinted(v.albedo.x, path.throughput.x), tinted(v.albedo.y, path.throughput.y),
@@ -192,7 +195,7 @@ inline Guides<F> guides_of(const VertexAovs<F>& v, const PathState<F>& path) {
 /// Input of all steps of a vertex. `depth` is 0 at the first vertex, and `t` is the length of the
 /// ray that arrived. `hit` and `geom` (the geometry within the instance's group) describe a
 /// surface; at a vertex in a volume `hit.inst` is kNoSurface. `kFeatures` is the set of features
-/// that the kernel is compiled for.
+/// with which the kernel is compiled.
 template <typename F, uint32_t kFeatures = kEverything>
 struct Vertex {
   const SceneView& scene;
@@ -218,12 +221,12 @@ struct Vertex {
   bool has_links() const { return has(kLinks) && scene.lights.links.members; }
 };
 
-/// Length of a shadow ray as a fraction of the distance to the light, so that the ray ends before
-/// the light's surface.
+/// Length of a shadow ray as a fraction of the distance to the light. The fraction is below 1 so
+/// that the ray ends before the light's surface.
 inline constexpr float kShadowRayFraction = 0.9999f;
 
-/// Limits a contribution to a luminance of at most `limit` by scaling, where 0 means no limit, and
-/// drops contributions that are not finite.
+/// Scales a contribution down to a luminance of at most `limit`, where 0 means no limit.
+/// Contributions that are not finite become 0.
 template <typename F>
 class ContributionLimit {
  public:
@@ -236,7 +239,7 @@ class ContributionLimit {
     scale_ = select(y > limit, F(limit / max(y, F(1e-30f))), F(1.f));
   }
   /// Returns `part`, limited by the same factor as the contribution given to the constructor.
-  /// `part` is a summand of this contribution or equal to it.
+  /// `part` is this contribution or one of its summands.
   Color<F> of(const Color<F>& part) const {
     return limited_ ? finite(part) * scale_ : finite(part);
   }
@@ -269,7 +272,7 @@ inline UInt<F> instance_geometry(const SceneView& scene, const UInt<F>& inst, co
   return gather_member<F>(scene.instances, &InstanceRecord::emissive, inst, active) + geom;
 }
 
-/// Returns the lanes whose camera ray hits a holdout, which is black and has alpha 0. Requires
+/// Returns the lanes whose camera ray hits a holdout. Holdouts are black and have alpha 0. Requires
 /// scene.visibility.
 template <typename F>
 inline Mask<F> is_holdout(const SceneView& scene, const UInt<F>& inst, const UInt<F>& geom,

@@ -26,8 +26,8 @@ inline constexpr const char* kPhaseNames[kPhaseCount] = {
     "materialize", "shade",      "shadow", "resolve", "metrics"};
 
 /// Clock that measures the time of each phase. Entering a phase ends the previous phase, so the
-/// times of all phases add up to the time between start() and stop(). Used once per batch of work,
-/// never per ray.
+/// times of all phases add up to the time between start() and stop(). The clock is read once per
+/// batch of work, never per ray.
 class PhaseClock {
  public:
   using Clock = std::chrono::steady_clock;

@@ -8,7 +8,7 @@
 namespace wavecomb {
 
 /// Value of ShadingRecord::inst for volume events, which have no surface. The value differs from
-/// kNoHit and kLightShape, for which no ShadingRecord is made.
+/// kNoHit and kLightShape; hits with those values have no ShadingRecord.
 inline constexpr uint32_t kNoSurface = 0xfffffffdu;
 static_assert(kNoSurface < kLightShape && kLightShape < kNoHit);
 

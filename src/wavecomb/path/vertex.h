@@ -31,7 +31,7 @@ inline UInt<F> crossed_at(const Vertex<F, kFeatures>& v, const Frame<F>& frame, 
          bit(out.has_shadow & crosses(out.shadow_d), kShadowCrosses);
 }
 
-/// Runs the steps of a vertex for the paths in active lanes. All these vertices have the shading
+/// Runs the steps of a vertex for the paths in active lanes. All of these vertices have the shading
 /// program `Bsdf`. `joint` couples the paths to a joint transport (joint_transport.h).
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Coupling>
 WAVECOMB_INLINE VertexResult<F> vertex_steps(const Vertex<F, kFeatures>& v, Coupling& joint) {

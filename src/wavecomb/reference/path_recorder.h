@@ -38,8 +38,8 @@ class PathRecorder {
     events_.light<Technique::kEmitter, F>({depth, kSlot, c}, [&] { return hit.geom; }, true);
   }
 
-  /// Records the first hit of a camera ray for AOVs. The ray with direction `dir` has hit a surface
-  /// or a volume event at `p`.
+  /// Records the first hit of a camera ray for AOVs: a surface or a volume event at `p`. `dir` is
+  /// the direction of the ray.
   void note_first_hit(const Vec3<F>& dir, const Vec3<F>& p, const SingleHit& hit, uint32_t mesh,
                       uint32_t material) {
     const RayEnd<F> end{kSlot, p, rays_.time()};

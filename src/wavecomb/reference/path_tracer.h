@@ -28,7 +28,7 @@ struct NoJointTracer {
   /// Processes the path vertex at `depth` after its shadow ray was traced, and adds the joint
   /// transport's contribution to the path. `rays` traces the rays of the path.
   void use_vertex(uint32_t /*depth*/, SingleRays& /*rays*/) {}
-  /// Ends a path whose radiance was added to the film pixel with the given index.
+  /// Ends a path after its radiance was added to the film pixel with the given index.
   void end(size_t /*index*/) {}
   void end_task(const WaveTask& /*task*/) {}
 };
@@ -49,8 +49,8 @@ class PathTracer : PathRecorder {
 
   Joint& joint() { return joint_; }
 
-  /// Traces the path of `task`, which has one pixel and one sample, and returns its radiance times
-  /// the camera's exposure. Slot 0 of the worker's AOVs then holds the AOVs of the path.
+  /// Traces the path of `task`, which has one pixel and one sample, and returns the path's radiance
+  /// times the camera's exposure. Slot 0 of the worker's AOVs then holds the AOVs of the path.
   Color<F> exposed_path(const WaveTask& task) {
     aovs_.clear(1);
     history_.clear(1);
@@ -65,7 +65,8 @@ class PathTracer : PathRecorder {
     }
     return radiance_.sum;
   }
-  /// Traces a path, and stores the lights that its vertices sample in `out`, at path index `path`.
+  /// Traces a path, and stores in `out`, at path index `path`, the lights that the vertices of the
+  /// path sample.
   void probe(uint32_t pixel, uint32_t sample, size_t path, LightProbes& out) {
     probes_ = {out.probes.data() + path * out.most, out.most};
     probe_count_ = 0;
@@ -185,8 +186,8 @@ class PathTracer : PathRecorder {
     if (flight.stopped) hit = {flight.t, 0.f, 0.f, 0, 0, kNoSurface, flight.material};
   }
 
-  /// Traces the shadow ray of a vertex, and adds its light sample, whose light belongs to the light
-  /// group `group`. Returns whether the ray is free.
+  /// Traces the shadow ray of a vertex, and adds the vertex's light sample to the light group
+  /// `group`. Returns whether the ray is free.
   bool trace_shadow(const SampleKey<F>& key, uint32_t depth, const VertexResult<F>& v,
                     uint32_t group) {
     clock_.enter(Phase::kShadow);
@@ -197,9 +198,9 @@ class PathTracer : PathRecorder {
     return is_free;
   }
 
-  /// Runs the subsurface random walk of a ray that has entered a body. If the ray does not hit the
-  /// body again, it continues as a normal ray. Sets `left_body` if the walk has left the body.
-  /// Returns false if the path is terminated.
+  /// Runs the subsurface random walk of a ray that has entered a body. A ray that does not hit the
+  /// body again continues as a normal ray. Sets `left_body` if the walk has left the body. Returns
+  /// false if the path is terminated.
   bool walk(const SampleKey<F>& key, uint32_t depth, PathState<F>& path, SingleHit& hit,
             bool& left_body) {
     path.enters_body = false;
@@ -233,8 +234,9 @@ class PathTracer : PathRecorder {
   }
 
   /// Adds the contribution of the light sample in `v` to the light group `group`. Volumes always
-  /// attenuate the contribution. Media inside meshes attenuate it only if the shadow ray is free.
-  /// If an object blocks the shadow ray, the contribution is multiplied by `v.shadow_tint`.
+  /// attenuate the contribution. Media inside meshes attenuate the contribution only if the shadow
+  /// ray is free. If an object blocks the shadow ray, the contribution is multiplied by
+  /// `v.shadow_tint`.
   void add_direct(const SampleKey<F>& key, uint32_t depth, const VertexResult<F>& v, bool is_free,
                   uint32_t group) {
     Color<F> c = v.direct;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Scalar reference integrator: traces one path after the other, depth first and without queues.
-/// Waves must match its image bit for bit.
+/// The image of the wavefront integrator must match its image bit for bit.
 #pragma once
 
 #include <memory>

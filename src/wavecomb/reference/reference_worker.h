@@ -16,7 +16,7 @@ struct ReferenceWorker {
         joint(1, context.joint, context.film->aovs().layout(), context.aovs),
         walks(context.scene.subsurface.media ? SoaBlock(Wave::kWalkColumns, 1) : SoaBlock()),
         nested_media(context.has_medium_stack() ? 1 : 0) {}
-  /// Returns the receiver of the events of the traced path.
+  /// Returns the object that records the events of the traced path.
   PathEvents events(const WaveContext& context) {
     return {context.scene, *context.camera, aovs, history, &radiance.sum.x};
   }

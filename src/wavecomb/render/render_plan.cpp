@@ -17,11 +17,12 @@ namespace {
 constexpr uint32_t kDefaultWaveSize = 4096;
 constexpr uint32_t kPassSamples = 16;
 
-/// Brightness of the darkest layer of cascades (film/cascades.h), relative to that of the scene.
+/// Brightness of the darkest layer of cascades (film/cascades.h), relative to the brightness of the
+/// scene.
 constexpr float kDarkestShare = 0x1p-12f;
 
-/// Creates the policy called `name`. For "adaptive", creates all policies that the chooser selects
-/// from, "none" first.
+/// Creates the policy called `name`. For "adaptive", creates all policies among which the chooser
+/// selects, starting with "none".
 std::vector<std::unique_ptr<SchedulingPolicy>> make_policies(const std::string& name) {
   std::vector<std::unique_ptr<SchedulingPolicy>> policies;
   if (name == "adaptive")

@@ -23,18 +23,18 @@
 
 namespace wavecomb {
 
-/// Returns the number of threads of a render: Settings::threads, or all hardware threads if that is
-/// 0.
+/// Returns the number of threads of a render: Settings::threads, or the number of hardware threads
+/// if this setting is 0.
 uint32_t thread_count(const Settings& settings);
 
 /// Returns the number of paths in a wave of a render of `pixels` pixels: the value in the settings
 /// or 4096, reduced so that every thread gets several waves.
 uint32_t wave_size_for(const Settings& settings, uint64_t pixels);
 
-/// Returns the grid over the scene for Morton codes.
+/// Returns the grid over the scene in which Morton codes are computed.
 OrderGrid order_grid(const Bounds& bounds);
 
-/// Returns the samples per pixel that a pass of a render adds if it is not adaptive. For images
+/// Returns the samples per pixel that a pass adds in a render that is not adaptive. For images
 /// smaller than a wave, returns enough to fill a wave.
 uint32_t samples_of_pass(const Settings& settings, uint64_t pixels, uint32_t wave_size);
 
@@ -44,8 +44,8 @@ uint32_t samples_of_pass(const Settings& settings, uint64_t pixels, uint32_t wav
 /// Contract: scene, accelerator, settings and policy outlive the plan, and the plan outlives the
 /// films and contexts made from it.
 struct RenderPlan {
-  /// `policy` replaces the policy of the settings, unless it is null. Throws Error if the scene or
-  /// this build does not support what the settings ask for.
+  /// If `policy` is not null, it replaces the policy of the settings. Throws Error if the scene or
+  /// this build does not support the settings.
   RenderPlan(const Scene& scene, const EmbreeAccelerator& accelerator, const Settings& settings,
              JointShare joint_share, const SchedulingPolicy* policy);
   RenderPlan(const RenderPlan&) = delete;
@@ -57,7 +57,7 @@ struct RenderPlan {
   WaveSetup waves;
   LaneKernels kernels;
   uint32_t pass_samples;  ///< samples_of_pass()
-  /// The scheduling policy of the render, or for `adaptive` all policies among which each thread
+  /// Scheduling policy of the render or, for `adaptive`, all policies among which each thread
   /// chooses.
   std::vector<const SchedulingPolicy*> policies;
   std::vector<MaterialTraits> traits;  ///< by material
@@ -66,7 +66,7 @@ struct RenderPlan {
   AovTables aovs;
   Region window;  ///< pixels of the film
   JointPlan joint;
-  SceneView view;  ///< has the light tree if lights are selected by it
+  SceneView view;  ///< includes the light tree if lights are selected by the tree
 
   /// Creates an empty film with all layers that the settings ask for.
   Film make_film() const;

@@ -75,8 +75,8 @@ void RenderRun::work(PilotCache& cache, const PilotShared& shared,
       cache);
   pilots_.apply(context_);
   if (shared.joint) *shared.joint = pilots_.joint;
-  // Set camera_squares only after the pilots: it makes light splats hold squared contributions, but
-  // pilots measure light.
+  // Set camera_squares only after the pilots, because light splats then hold squared contributions,
+  // but pilots measure light.
   if (options_.wants_camera_squares) plan_.joint.measure_squares(context_.joint);
   if (!stopped()) learned(pilots_);
   loop_.run();

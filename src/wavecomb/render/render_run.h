@@ -26,19 +26,19 @@ namespace wavecomb {
 /// Data that is shared by all pilot renders for one image. Both pointers are null in renders that
 /// are not pilots.
 struct PilotShared {
-  const Settings* image = nullptr;  ///< image whose lights are calibrated
+  const Settings* image = nullptr;  ///< settings of the image for which lights are calibrated
   /// Result of the joint transport's pilot, from the first pilot render.
   std::shared_ptr<const JointPilot::Result>* joint = {};
 };
 
 /// Execution of a render according to its plan.
 ///
-/// Contract: all functions on one thread; run() once, finish() once and last. The arguments of the
-/// constructor outlive the run.
+/// Contract: one thread calls all functions. It calls run() once, and then finish() once as the
+/// last function. The arguments of the constructor outlive the run.
 class RenderRun {
  public:
   /// `build_s` is the build time of the accelerator in seconds, for statistics. `transport` is the
-  /// choice that led to the plan, if the settings left it open.
+  /// choice of the transport for the plan, if the settings did not specify the transport.
   RenderRun(std::shared_ptr<const Scene> scene, const RenderPlan& plan,
             const RenderOptions& options, Watch& watch, double build_s,
             std::optional<TransportChoice> transport);
@@ -48,7 +48,7 @@ class RenderRun {
   void run(PilotCache& cache, const PilotShared& shared,
            const std::function<void(const PilotResults&)>& learned);
 
-  /// Returns the statistics of the render so far. Contract: while no worker runs.
+  /// Returns the statistics of the render so far. Contract: no worker runs during the call.
   RenderStatistics statistics() const;
   CostProfile cost_profile() const { return costs_.profile(); }
   /// Returns the image and frees the film. Adds the error of the image and the peak memory to
@@ -61,7 +61,7 @@ class RenderRun {
   void work(PilotCache& cache, const PilotShared& shared,
             const std::function<void(const PilotResults&)>& learned);
   void take_snapshot(bool is_finished);
-  /// Throws Error if a texture could not be read, because pixels that use it are black.
+  /// Throws Error if a texture could not be read, since pixels that show this texture are black.
   void check_textures() const;
 
   std::shared_ptr<const Scene> scene_;

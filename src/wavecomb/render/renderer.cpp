@@ -42,7 +42,7 @@ struct WavefrontRenderer::Impl {
 
 namespace {
 
-/// Marks the renderer as rendering during its lifetime.
+/// While an object of this class exists, the renderer counts as rendering.
 template <typename Impl>
 class Running {
  public:

@@ -43,7 +43,7 @@ struct RenderedImage {
   uint32_t width = 0, height = 0;
   std::vector<float> beauty;  ///< rgb, linear Rec.709
   std::vector<float> albedo;  ///< rgb
-  std::vector<float> normal;  ///< xyz, world space, mean of unit vectors
+  std::vector<float> normal;  ///< xyz in world space; mean of unit vectors
   std::vector<float> depth;   ///< along the camera's axis; infinite where rays leave the scene
   std::vector<uint32_t> samples;
   // The following layers are empty unless Settings::needs_error() is true.
@@ -55,15 +55,15 @@ struct RenderedImage {
 };
 using Picture [[deprecated("use RenderedImage")]] = RenderedImage;
 
-/// Callbacks and inputs of a render beside its settings. The thread that called render() calls the
-/// callbacks. An exception from a callback ends the render.
+/// Callbacks and inputs of a render, in addition to its settings. The thread that called render()
+/// calls the callbacks. An exception from a callback ends the render.
 struct RenderOptions {
   /// Called every `interval_s`, and once at the end unless the render was cancelled.
   std::function<Request(const RenderStatus&)> progress{};
   /// Called if `progress` requests a snapshot, and always at the end.
   std::function<void(const Snapshot&)> snapshot{};
   /// Restores the empty film and the pass state from a snapshot of a render with these settings.
-  /// Returns the packed_training() of that render, or nothing to train again.
+  /// Returns the packed_training() of that render, or nothing if this render is to train again.
   std::function<std::vector<std::byte>(Film&, PassState&)> resume{};
   /// packed_training() of an earlier render of the same scene, or of the render that is resumed.
   /// These data replace training and the choice of the transport. If empty, the render trains and
@@ -71,15 +71,15 @@ struct RenderOptions {
   std::vector<std::byte> learned{};
   /// Replaces the policy of the settings.
   const SchedulingPolicy* policy = nullptr;
-  /// Initial costs for shading order and roulette. Costs that the profile lacks are measured on
-  /// synthetic hits, or modelled.
+  /// Initial costs for shading order and roulette. Costs that are not in the profile are measured
+  /// on synthetic hits, or modelled.
   const CostProfile* profile = nullptr;
   /// Records the rays of the wavefront integrator. An exception from the recorder ends the render.
   RayRecorder* recorder = nullptr;
   double interval_s = 0.1;  ///< seconds between calls of `progress`
-  /// If true, as in pilot renders with light paths, light splats hold variance instead of light:
-  /// the variance that the light would add to one sample of a pixel if camera paths had to find it,
-  /// divided by scene_brightness() (light_vertex.h).
+  /// If true, as in pilot renders with light paths, light splats hold variance instead of light.
+  /// This is the variance that one sample of a pixel would have if camera paths had to find the
+  /// light, divided by scene_brightness() (light_vertex.h).
   bool wants_camera_squares = false;
   /// If false, render() returns an empty image, for callers that use snapshots. Without the image,
   /// stopping a large render is faster.
@@ -89,8 +89,8 @@ struct RenderOptions {
 /// Renderer of an editable scene. The constructor builds the acceleration structure, and an edit
 /// rebuilds only the parts that it changes.
 ///
-/// Contract: render() may be called any number of times, one call at a time, and edit() between
-/// renders, both by one thread at a time. Any thread may call the other functions at any time.
+/// Contract: render() may be called any number of times, and edit() between renders, but only one
+/// thread at a time may call them. Any thread may call the other functions at any time.
 class WavefrontRenderer {
  public:
   /// `threads` is the number of threads for building; 0 means all.
@@ -119,16 +119,17 @@ class WavefrontRenderer {
   uint64_t version() const;
   /// Finds the surface or light of the current scene at an image point (wavecomb::pick).
   std::optional<Pick> pick(float x, float y, uint32_t width, uint32_t height) const;
-  /// Returns the learned data at the surface that pick() finds, from the running or else the last
-  /// render. Returns nothing if there is no surface or nothing was learned yet.
+  /// Returns the learned data at the surface that pick() finds, from the running render or, if none
+  /// is running, from the last render. Returns nothing if there is no surface or nothing was
+  /// learned yet.
   std::optional<LearnedData> learned(float x, float y, uint32_t width, uint32_t height) const;
 
   /// Returns the packed_training() of the last render, unless it was stopped during its pilots.
   std::vector<std::byte> packed_learned() const;
 
-  /// Returns the costs after the last render: a copy, since the next render replaces them.
+  /// Returns a copy of the costs after the last render, since the next render replaces them.
   CostProfile cost_profile() const;
-  /// Returns the statistics of the last render: a copy, since the next render replaces them.
+  /// Returns a copy of the statistics of the last render, since the next render replaces them.
   RenderStatistics statistics() const;
 
  private:

@@ -20,12 +20,12 @@ namespace wavecomb {
 struct Snapshot {
   Film& film;
   const PassState& pass;
-  const GuidingTraining&
-      training;  ///< training that took place before the first pass; may be empty
+  const GuidingTraining& training;  ///< result of the training before the first pass; may be empty
   const std::optional<TransportChoice>&
       transport;  ///< chosen transport, if the settings did not specify it
   RenderStatus status;
-  bool finished;  ///< whether no more samples follow: done, cancelled or out of time
+  /// Whether no more samples follow, since the render is done, cancelled or out of time.
+  bool finished;
   const std::vector<std::string>& light_groups;  ///< light groups that the film keeps
   /// Returns the statistics of the render so far.
   std::function<RenderStatistics()> statistics;

@@ -10,7 +10,7 @@
 
 namespace wavecomb {
 
-/// Requests that the supervising thread returns from poll().
+/// Requests that poll() returns to the supervising thread.
 enum class Request : uint8_t {
   kContinue,
   kSnapshot,  ///< pause the work to take a snapshot
@@ -34,8 +34,8 @@ class Watch {
   /// Asks the work to end soon. Any thread may call this function.
   void stop() { stopped_ = true; }
 
-  // Called by the work: Whether the work should pause or end soon. Any thread may call this
-  /// function.
+  /// Returns whether the work should pause or end soon; the work calls this function regularly. Any
+  /// thread may call it.
   bool halted() const { return stopped() || halted_.load(std::memory_order_relaxed); }
   /// Whether the work should end.
   bool stopped() const { return stopped_.load(std::memory_order_relaxed); }

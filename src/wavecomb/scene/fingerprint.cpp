@@ -15,7 +15,7 @@
 namespace wavecomb {
 namespace {
 
-/// FNV-1a over 64-bit words, finished by the 64-bit mixer of MurmurHash3. Not safe against
+/// FNV-1a over 64-bit words, finished by the 64-bit mixer of MurmurHash3. The hash does not prevent
 /// deliberate collisions.
 class Hash {
  public:
@@ -138,8 +138,8 @@ uint64_t hash_materials(const Scene& scene) {
       WAVECOMB_OPENPBR_INPUTS(WAVECOMB_ADD)
 #undef WAVECOMB_ADD
       h.add(o.transmission_color, o.transmission_depth, o.subsurface_radius, o.thin_walled);
-      // Material inputs that were added to Wavecomb later are hashed only if they are set, so that
-      // older scenes keep their fingerprints.
+      // Material inputs that later versions of Wavecomb added are hashed only if they are set, so
+      // that older scenes keep their fingerprints.
       if (o.nested_priority != 0) add_named(h, "nested_priority", o.nested_priority);
       const Vec3<float>& scatter = o.transmission_scatter;
       if (scatter.x != 0 || scatter.y != 0 || scatter.z != 0)
@@ -173,7 +173,7 @@ uint64_t hash_textures(const Scene& scene) {
     h.add(v.format, v.channels, v.srgb, v.has_alpha, v.wrap_s, v.wrap_t, v.level_count);
     for (uint32_t l = 0; l < v.level_count; ++l) h.add(v.levels[l].width, v.levels[l].height);
     h.add_bytes(v.texels, texture->bytes());
-    // Tiles are textures of the scene too, so their indices identify them.
+    // Each tile is also a texture of the scene, so its texture index identifies the tile.
     for (const auto& [number, tile] : texture->tiles())
       for (uint32_t at = 0; at < scene.textures().size(); ++at)
         if (scene.textures()[at] == tile) h.add(number, at);
@@ -196,8 +196,8 @@ void add_value(Hash& h, const LightParameter& p, const LightValue& value) {
       value);
 }
 
-/// Hashes all parameters of a light that light_table() lists, including shared ones that its kind
-/// does not use, but without those specific to another kind.
+/// Hashes all parameters of a light in light_table() except parameters specific to other kinds of
+/// lights. Shared parameters are hashed even if this kind of light does not use them.
 void add_light(Hash& h, const Light& l) {
   h.add(l.kind, l.to_world);
   for (const LightParameter& p : light_table())
@@ -258,8 +258,8 @@ uint64_t hash_names(const Scene& scene) {
   return h.value();
 }
 
-/// Hashes the camera. Parameters that were added later are hashed only if they differ from their
-/// default, so that older scenes keep their fingerprints.
+/// Hashes the camera. Parameters that later versions added are hashed only if they differ from
+/// their default, so that older scenes keep their fingerprints.
 uint64_t hash_camera(const Scene& scene) {
   Hash h;
   const Camera& c = scene.camera();

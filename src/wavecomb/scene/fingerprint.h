@@ -11,9 +11,10 @@
 
 namespace wavecomb {
 
-/// Returns hashes of everything that affects the image, as (part, hash): "geometry", "materials",
-/// "textures", "lights", "camera", and "names", which appear in AOVs. `arrays` includes geometry
-/// and textures, of which every byte is read.
+/// Returns hashes of everything that affects the image, as pairs (part, hash). The parts are
+/// "geometry", "materials", "textures", "lights", "camera", and "names", which stands for names
+/// that appear in AOVs. If `arrays` is true, geometry and textures are included, and every byte of
+/// them is read.
 std::vector<std::pair<std::string, uint64_t>> fingerprint(const Scene& scene, bool arrays = true);
 
 }  // namespace wavecomb

@@ -59,8 +59,9 @@ class MoveFinder {
   std::vector<bool> found_;
 };
 
-/// Puts the meshes of the world into groups, one for each set of moves that applies to a mesh, and
-/// instances the groups. The meshes of the world that do not move form a group as well.
+/// Puts the meshes of the world into groups and instances the groups. Meshes to which the same
+/// moves apply are in the same group. The meshes of the world that do not move form a group as
+/// well.
 void instance_world(SceneGeometry& geometry, const ObjectNames& names, MoveFinder& finder) {
   std::map<Matches, std::vector<uint32_t>> by_moves;
   uint32_t object = 0;
@@ -78,7 +79,8 @@ void instance_world(SceneGeometry& geometry, const ObjectNames& names, MoveFinde
   geometry.groups[0].meshes.clear();
 }
 
-/// Returns the moves of all meshes of an instance, whose first object is `object`.
+/// Returns the moves of an instance, which apply to all its meshes. `object` is the first object of
+/// the instance.
 Matches moves_of_instance(const SceneGeometry& geometry, const Instance& instance, uint32_t object,
                           const ObjectNames& names, MoveFinder& finder) {
   const size_t count = geometry.groups[instance.group].meshes.size();

@@ -24,8 +24,8 @@ Affine move_of(const Moves& moves, std::string_view object);
 ///
 /// Moved meshes of the world become instances. All other meshes of the world together become a
 /// single instance, so that the next move does not rebuild their acceleration structure. Meshes
-/// keep their ids and arrays. Throws Error for a singular transform, a path without objects or
-/// lights, a part of an instance, and volumes.
+/// keep their ids and arrays. Throws Error if a transform is singular, or if a path contains
+/// neither objects nor lights, names a part of an instance, or contains volumes.
 std::shared_ptr<const SceneGeometry> moved_geometry(const Scene& unmoved, const Moves& moves);
 
 }  // namespace wavecomb

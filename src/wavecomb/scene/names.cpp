@@ -69,8 +69,8 @@ ObjectNames::ObjectNames(const Scene& scene) : scene_(scene) {
 }
 
 ObjectNames::Found ObjectNames::find(uint32_t index) const {
-  // An instance without meshes has the same first object as the next instance, so take the last of
-  // them.
+  // An instance without meshes has the same first object as the next instance, so take the last
+  // such instance.
   const auto next = std::upper_bound(first_object_.begin(), first_object_.end(), index);
   const auto instance = static_cast<uint32_t>(next - first_object_.begin() - 1);
   const uint32_t group = instance == 0 ? 0 : scene_.instances()[instance - 1].group;
@@ -121,8 +121,8 @@ std::string ObjectNames::asset(uint32_t index) const {
     if (placement.name == kNoName) continue;
     const PlacementName name = scene_.names()[placement.name];
     if (name.asset_length == 0) continue;
-    // If the asset is named by a placement with several instances, the asset is the single
-    // instance.
+    // If the name of the asset is the name of a placement with several instances, each of these
+    // instances is an asset.
     if (name.asset_length == name.text.size()) return placement_name(p);
     return path_through(placement_name(placement.parent), parent_root(placement),
                         name.text.substr(0, name.asset_length));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Names of all objects of a scene, made on demand.
+/// Names of all objects of a scene, created on demand.
 #pragma once
 
 #include <cstdint>
@@ -52,16 +52,16 @@ struct Placement {
 
 /// Names of all objects of a scene: mesh instances, then lights, then volumes.
 ///
-/// The name of an object is its prim path as seen through its instances: "/World/Tree_7/Leaves", or
-/// "/World/Forest[12]/Leaves" for a point instance. The asset of an object is the nearest enclosing
-/// model of kind component; without such a model, the outermost instance, or the prim below the
-/// stage's root prim.
+/// The name of an object is its prim path, in which the path of an instance replaces the path of
+/// the prototype: "/World/Tree_7/Leaves", or "/World/Forest[12]/Leaves" for a point instance. The
+/// asset of an object is the nearest enclosing model of kind component; if there is no such model,
+/// the asset is the outermost instance or the prim below the stage's root prim.
 class ObjectNames {
  public:
   explicit ObjectNames(const Scene& scene);
 
-  /// Returns the number of objects. Objects are numbered by instance, the world first, and within
-  /// an instance by mesh; light records follow, then volumes.
+  /// Returns the number of objects. Objects are numbered instance by instance, starting with the
+  /// world, and mesh by mesh within an instance. Light records follow, then volumes.
   uint32_t count() const { return first_volume() + volume_count_; }
   /// Returns the index of the first object of each instance in SceneView::instances.
   const std::vector<uint32_t>& first_object() const { return first_object_; }

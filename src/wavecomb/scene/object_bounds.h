@@ -17,13 +17,13 @@ bool is_in_prim(std::string_view object, std::string_view prim);
 /// curves and points.
 Bounds mesh_bounds(const Mesh& mesh);
 
-/// Extends `out` by the corners of a box in an instance, over the whole shutter interval.
+/// Extends `out` by the corners of a box of an instance, at all times of the shutter interval.
 void add_instance_bounds(Bounds& out, const Bounds& box, const Instance& instance,
                          std::span<const MatrixStep> steps);
 
 /// Returns the world bounds, over the whole shutter interval, of all meshes at or below a prim
-/// (named as by ObjectNames). Returns empty bounds if no mesh is at or below the prim. Visits every
-/// object of the scene, so call it rarely.
+/// (named as by ObjectNames). Returns empty bounds if no mesh is at or below the prim. The function
+/// visits every object of the scene, so call it rarely.
 Bounds object_bounds(const Scene& scene, std::string_view prim);
 
 }  // namespace wavecomb

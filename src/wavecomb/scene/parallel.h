@@ -8,7 +8,7 @@
 
 namespace wavecomb {
 
-/// Calls `work`. Parallel loops that `work` runs use `threads` threads; 0 means all threads.
+/// Calls `work`, with `threads` threads for the parallel loops inside it; 0 means all threads.
 void with_threads(uint32_t threads, const std::function<void()>& work);
 
 /// Calls body(0) to body(n - 1) in any order on several threads. `with_threads` sets the number of

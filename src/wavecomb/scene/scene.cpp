@@ -117,8 +117,8 @@ void Scene::link() {
   }
   std::vector<uint32_t> visibility = object_visibility(*this, names);
   if (visibility.empty()) return;
-  // Bounce rays must be able to hit emitters that are sampled as lights, since their MIS weights
-  // assume that they can.
+  // Bounce rays must be able to hit emitters that are sampled as lights, since the MIS weights
+  // assume that bounce rays can hit them.
   for (size_t i = 0; i < lights_->emissive.size(); ++i)
     if (lights_->emissive[i] != kNoLight) visibility[i] |= kVisibleToBounces;
   visibility_ = std::make_shared<const std::vector<uint32_t>>(std::move(visibility));

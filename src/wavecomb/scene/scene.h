@@ -20,7 +20,7 @@
 
 namespace wavecomb {
 
-/// Device view of a scene: plain pointers, valid for as long as the Scene.
+/// Device view of a scene. The pointers are valid as long as the Scene exists.
 struct SceneView {
   const MeshRecord* meshes = nullptr;
   const InstanceRecord* instances = nullptr;
@@ -104,16 +104,16 @@ class Scene : public std::enable_shared_from_this<Scene> {
   /// Returns the index into light_groups() of every light of the light set; triangle lights come
   /// last.
   std::vector<uint32_t> groups_of_lights() const;
-  /// Returns, for every light of the light set, 1 if the light is the emission of an object's
-  /// material and 0 if it is a light of the stage.
+  /// Returns a value for every light of the light set: 1 if the light is the emission of an
+  /// object's material, and 0 if the light is a light of the stage.
   std::vector<uint8_t> lights_of_objects() const;
   /// Returns the nesting of groups from the world to the instances, with the names of its
   /// placements.
   const std::vector<Placement>& placements() const { return geometry_->placements; }
   const NameTable& names() const { return geometry_->names; }
   const LightSet& light_set() const { return lights_->set; }
-  /// Returns the complete light tree; light_set() may contain only an outline of it. If the tree
-  /// has not been built yet, builds it with `threads` threads (0 means all). Thread-safe.
+  /// Returns the complete light tree; light_set() may contain only an outline of this tree. If the
+  /// tree has not been built yet, builds it with `threads` threads (0 means all). Thread-safe.
   const LightTree& light_tree(uint32_t threads) const { return lights_->tree(threads); }
   const Camera& camera() const { return camera_; }
   const Bounds& bounds() const { return geometry_->bounds; }
@@ -126,8 +126,8 @@ class Scene : public std::enable_shared_from_this<Scene> {
   uint64_t points() const;
   uint64_t splats() const;
   SceneBytes bytes() const;
-  /// Returns warnings about invalid scene data that was repaired or skipped while building, such as
-  /// NaN points; one line per warning.
+  /// Returns warnings about scene data that was skipped or has no effect, such as instances with
+  /// singular transforms; one line per warning.
   const std::vector<std::string>& warnings() const { return geometry_->warnings; }
 
   /// Returns a new scene with the values of `edit`. The new scene shares all unchanged data with
@@ -137,14 +137,14 @@ class Scene : public std::enable_shared_from_this<Scene> {
   ///
   /// A camera edit takes microseconds. A material edit copies the materials. An edit of lights or
   /// of emission rebuilds the light set. If a new material needs tangents, the edit computes them.
-  /// Edits that change which materials absorb, or that move a light or an object, search absorbing
-  /// glass for objects and lights inside it. A move of an object also copies the instances, and
-  /// rebuilds the light set if the scene has emissive meshes or lights below the prim. Throws Error
-  /// with the name of the object if a value is invalid or an id is unknown.
+  /// Edits that change the set of absorbing materials, or that move a light or an object, search
+  /// for objects and lights inside absorbing glass. A move of an object also copies the instances,
+  /// and rebuilds the light set if the scene has emissive meshes or lights below the prim. Throws
+  /// Error with the name of the object if a value is invalid or an id is unknown.
   std::shared_ptr<const Scene> edited(const SceneEdit& edit, uint32_t threads = 0) const;
 
-  /// Return the parts of the scene, so that callers can tell which parts an edited scene shares
-  /// with it.
+  /// Return the parts of the scene, so that callers can find out which parts an edited scene shares
+  /// with this scene.
   const std::shared_ptr<const SceneGeometry>& geometry() const { return geometry_; }
   const std::shared_ptr<const SceneMaterials>& material_part() const { return materials_; }
   const std::shared_ptr<const SceneLights>& light_part() const { return lights_; }
@@ -155,7 +155,7 @@ class Scene : public std::enable_shared_from_this<Scene> {
         std::shared_ptr<const SceneMaterials> materials, std::shared_ptr<const SceneLights> lights,
         std::shared_ptr<const SceneTangents> tangents, std::shared_ptr<const SceneLinks> links,
         const Camera& camera);
-  /// Computes for each object the link sets that it belongs to and the kinds of rays that see it.
+  /// Computes the link sets of each object, and the kinds of rays that see the object.
   void link();
   /// Returns the value of `SceneMaterials::in_glass` for an edit of this scene that has the given
   /// geometry, materials and lights.
@@ -201,8 +201,8 @@ class SceneBuilder {
   uint32_t add_texture(const TextureDesc& desc);
   /// Adds a texture of another scene. The other scene may be destroyed before this scene.
   uint32_t add_texture(TexturePtr texture);
-  /// Makes a UDIM texture from textures already added, by tile number from 1001 to 1100. `missing`
-  /// is the linear r, g, b, alpha of missing tiles.
+  /// Makes a UDIM texture from textures that were added before. Tile numbers are from 1001 to 1100.
+  /// `missing` is the linear r, g, b, alpha of missing tiles.
   uint32_t add_tiles(const std::string& name,
                      const std::vector<std::pair<uint32_t, uint32_t>>& tiles,
                      const std::array<float, 4>& missing);
@@ -216,22 +216,22 @@ class SceneBuilder {
   uint32_t add_material(Material material);
   /// Returns the id of the attribute called `name`, for MeshAttribute and for graphs.
   uint32_t attribute(const std::string& name);
-  /// Adds a mesh after checking sizes, indices and radii. Throws Error for faces with non-finite
-  /// points; faces without area are kept (no ray hits them).
+  /// Adds a mesh after checking sizes, indices and radii. Throws Error if a point is not finite.
+  /// Faces without area are kept; no ray hits them.
   uint32_t add_mesh(Mesh mesh);
-  /// Replaces the arrays of a mesh, with the checks of add_mesh. The mesh keeps its name, its light
-  /// group and its place in groups.
+  /// Replaces the arrays of a mesh, with the checks of add_mesh. The mesh keeps its name and light
+  /// group, and stays in the same group of meshes.
   void replace_mesh(uint32_t id, Mesh mesh);
   /// Adds an empty group, to hold meshes and instances of other groups. Group 0, the world, always
-  /// exists. `root` is the prim path prefix of the names in the group; in the names of objects, the
-  /// name of the placement replaces it (ObjectNames).
+  /// exists. `root` is the prim path prefix of the names in the group. In the names of objects, the
+  /// name of the placement replaces this prefix (ObjectNames).
   uint32_t add_group(std::string name, std::string root = {});
   void add_to_group(uint32_t group, uint32_t mesh);
   /// Instances the group `child` in the group `parent`, nested to any depth without copying
   /// geometry. `material` (or kInheritMaterial) applies to meshes of the child without a material.
-  /// `name` is an id of add_placement_name; `number` distinguishes placements of the same name.
-  /// `steps` are transforms at equally spaced shutter times, two or more for a moving instance, and
-  /// replace `transform`.
+  /// `name` is an id of add_placement_name; `number` distinguishes placements of the same name. For
+  /// a moving instance, two or more `steps` replace `transform`: transforms at equally spaced
+  /// shutter times.
   void add_instance(uint32_t parent, uint32_t child, const Affine& transform,
                     uint32_t material = kInheritMaterial, uint32_t name = kNoName,
                     uint32_t number = kNoName, std::span<const Affine> steps = {});
@@ -240,7 +240,7 @@ class SceneBuilder {
   uint32_t add_placement_name(std::string_view name, uint32_t asset_length);
   /// Adds a geometry set and returns its id, for Light::light_link and Light::shadow_link.
   uint32_t add_geometry_set(GeometrySet set);
-  /// Sets which rays see a prim and its descendants. A later rule for the same path overrides an
+  /// Sets which rays see a prim and its descendants. A later rule for the same path replaces an
   /// earlier rule.
   void add_visibility(VisibilityRule rule);
   /// Adds an IES profile and returns its id, for Shaping::ies.
@@ -294,8 +294,9 @@ class SceneBuilder {
   /// Returns SceneMaterials::in_glass, and warns of glass whose absorption comes from a value
   /// graph.
   bool search_glass(const SceneGeometry& geometry);
-  /// Warns of glass whose absorption comes from a value graph, if `in_glass` is true or there are
-  /// objects or lights inside the glass. Without these, the missing absorption is not visible.
+  /// Warns of glass whose absorption comes from a value graph, if `in_glass` is true or if objects
+  /// or lights are inside the glass. In scenes without such objects and lights, the missing
+  /// absorption is not visible.
   void warn_of_absorbing_graphs(const PlacedObjects& objects, bool in_glass);
   /// Binds the grey material to instances without a material. Throws Error for materials that were
   /// never added.

@@ -20,7 +20,7 @@ namespace wavecomb {
 
 namespace {
 
-/// A grid that counts towards the memory limit of a texture store for as long as it is in use.
+/// A grid that counts towards the memory limit of a texture store while the grid is in use.
 struct CountedGrid {
   std::shared_ptr<const VolumeGrid> grid;
   std::shared_ptr<TileStore> store;

@@ -26,7 +26,8 @@ inline bool is_invertible(const Affine& m) {
 /// Returns "mesh '/World/Box'", or "mesh" for an empty name.
 std::string quoted(const std::string& kind, const std::string& name);
 
-/// Checks a material. `texture_count`, `graph_count`: number of textures and graphs in the scene.
+/// Checks a material. `texture_count` and `graph_count` are the numbers of textures and graphs in
+/// the scene.
 void check_material(const Material& material, size_t texture_count, size_t graph_count);
 void check_profile(const IesProfile& profile);
 /// Checks a light filter. `textures` and `filters` are the numbers of textures and light filters

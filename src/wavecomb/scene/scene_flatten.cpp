@@ -85,7 +85,7 @@ void SceneBuilder::flatten(uint32_t group, const Instance& here, std::span<const
     if (!steps.empty()) {
       out.back().motion = {static_cast<uint32_t>(geometry.steps.size()),
                            static_cast<uint32_t>(steps.size() - 1)};
-      // Code that uses a single transform of a moving instance takes the one at mid-shutter.
+      // Code that uses only one transform of a moving instance uses its transform at mid-shutter.
       out.back().to_world = at_step(steps, 1, 2);
       for (const Affine& m : steps) geometry.steps.emplace_back(m);
     }
@@ -126,8 +126,8 @@ void SceneBuilder::warn_of_absorbing_graphs(const PlacedObjects& objects, bool i
 }
 
 void SceneBuilder::flatten_groups(SceneGeometry& geometry) {
-  // Count instances before flattening: n nested groups can have 2^n placements, and most of them
-  // may be empty.
+  // Count instances before flattening: n nested groups can have 2^n placements, and most of these
+  // placements may be empty.
   std::vector<uint64_t> placements(groups_.size(), kUncounted);
   std::vector<Instance> flat;
   flat.reserve(count_placements(0, 0, placements));

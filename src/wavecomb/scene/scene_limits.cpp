@@ -19,7 +19,7 @@ constexpr uint64_t words_of = sizeof(Record) / 4;
 
 static_assert((kMaxInstances + 1) * words_of<InstanceRecord> == kGatherWords);
 
-/// Size in 32-bit words of the largest record that a material has in a table.
+/// Size in 32-bit words of the largest of the records that a material has in tables.
 constexpr uint64_t kMaterialWords =
     std::max({words_of<MaterialRecord>, kInputCount * words_of<TextureUseRecord>,
               words_of<OpenPbrRecord>, words_of<ProgramParameterRecord>});

@@ -12,7 +12,7 @@ inline constexpr uint64_t kGatherWords = uint64_t{1} << 31;
 /// Maximum size in 32-bit words of a table whose rows are loaded whole, with unsigned indices.
 inline constexpr uint64_t kMaxRowWords = uint64_t{1} << 32;
 
-/// Maximum number of instances, of 16 32-bit words each; the first is the world.
+/// Maximum number of instances, including the world. A record of an instance has 16 32-bit words.
 inline constexpr uint64_t kMaxInstances = kGatherWords / 16 - 1;
 
 /// Number of objects of each kind that kernels access by index.

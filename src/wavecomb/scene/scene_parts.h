@@ -27,7 +27,8 @@
 
 namespace wavecomb {
 
-/// Packed instance; a record fills one cache line. Instance 0 is the world itself (identity).
+/// Packed instance; a record fills one cache line. Instance 0 is the world itself, with the
+/// identity transform.
 struct alignas(64) InstanceRecord {
   float to_world[12];  ///< 3 x 4 matrix [A | translation], row by row
   /// Index of the first entry of the instance's group in SceneView::geometry_mesh.
@@ -76,9 +77,9 @@ inline constexpr uint32_t kMaxLightGroups = 64;
 /// Name of group 0, for lights without a group.
 inline constexpr const char* kOtherLights = "other";
 
-/// Scene data that edits of materials, lights and the camera do not change: shapes, transforms,
-/// textures and names. A scene with moved objects has a copy of this data with different instances
-/// (scene/moves.h).
+/// Scene data that does not change when materials, lights or the camera are edited: shapes,
+/// transforms, textures and names. A scene with moved objects has a copy of this data with
+/// different instances (scene/moves.h).
 struct SceneGeometry {
   std::vector<Mesh> meshes;
   /// Distinct face materials of each mesh; empty for meshes without face materials.
@@ -126,8 +127,8 @@ struct SceneGeometry {
     return {attribute_records.data(), mesh_attributes.data()};
   }
 
-  /// Calls test(material) for the materials of all faces of `mesh` until one returns true, and
-  /// returns whether one did. `inherited` is the material of the instance.
+  /// Returns whether test(material) is true for the material of any face of `mesh`. `inherited` is
+  /// the material of the instance.
   template <typename Test>
   bool any_material(uint32_t mesh, uint32_t inherited, const Test& test) const {
     const auto bound_material = [&](uint32_t m) {
@@ -152,7 +153,7 @@ struct SceneMaterials {
   /// needs a medium stack depends on `in_glass`.
   SceneMaterials(std::vector<Material> materials, std::shared_ptr<const GraphSet> graphs,
                  std::span<const TexturePtr> textures, uint32_t exit_material, bool in_glass);
-  /// Returns the materials without the one for collisions inside meshes.
+  /// Returns the materials without the internal material for collisions inside meshes.
   std::vector<Material> given() const;
 
   /// materials as passed to the constructor, before simplification
@@ -174,8 +175,8 @@ struct SceneMaterials {
   std::vector<MeshMedium<float>> nested_media;
   /// MeshMediaView::event_material, the last material; kInheritMaterial if `nested_media` is empty.
   uint32_t event_material = kInheritMaterial;
-  /// Whether paths must track which absorbing glass they are inside, because the glass contains
-  /// objects or lights (medium/description/glass_contents.h) or the scene has volumes.
+  /// Whether paths must track the absorbing glass that they are inside of, because the glass
+  /// contains objects or lights (medium/description/glass_contents.h) or the scene has volumes.
   bool in_glass = false;
   /// Whether the absorption of some glass comes from a value graph (absorbs_by_graph).
   bool has_absorbing_graphs = false;
@@ -184,9 +185,9 @@ struct SceneMaterials {
 
 /// Lights of the stage and emissive triangles.
 struct SceneLights {
-  /// Packs the lights, and makes lights of the triangles of all meshes whose materials emit.
-  /// `before` may be the lights of a scene with the same geometry, whose unchanged data is then
-  /// reused, or null.
+  /// Packs the lights, and adds a light for each triangle of all meshes with emissive materials.
+  /// `before` may be null or the lights of a scene with the same geometry; data that has not
+  /// changed is then reused.
   SceneLights(std::vector<Light> lights, const SceneGeometry& geometry,
               const SceneMaterials& materials, const SceneLights* before);
 
@@ -201,11 +202,11 @@ struct SceneLights {
   std::vector<uint32_t> emissive;  ///< SceneView::emissive_lights; empty if nothing emits
   /// SceneView::mesh_lights; empty if the scene has no mesh lights
   std::vector<uint32_t> mesh_lights;
-  /// Light group of a range of triangle lights, which begins at `first` and ends at the `first` of
-  /// the next entry.
+  /// Light group of a range of triangle lights. The range begins at `first` and ends at the next
+  /// entry's `first`.
   struct TriangleGroup {
     uint32_t first, group;
-    /// true for the triangles of a mesh light, false for those of an emissive material
+    /// true for triangles of a mesh light, false for triangles with an emissive material
     bool is_light;
   };
   std::vector<TriangleGroup> triangle_groups;

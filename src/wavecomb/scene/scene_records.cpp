@@ -16,7 +16,7 @@ uint64_t address(const void* p) {
   return reinterpret_cast<uint64_t>(p);
 }
 
-/// Returns sqrt(uv area / area) of the whole mesh, or 0 if it has no uvs.
+/// Returns sqrt(uv area / area) of the whole mesh, or 0 if the mesh has no uvs.
 float uv_density(const Mesh& mesh) {
   if (mesh.uvs_at == Attribute::kNone || mesh.is_curved()) return 0;
   double area = 0, uv_area = 0;

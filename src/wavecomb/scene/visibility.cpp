@@ -20,9 +20,9 @@ std::string_view above(std::string_view path) {
   return slash == std::string_view::npos ? std::string_view() : path.substr(0, slash);
 }
 
-/// Returns the visibility of an object with the path `object_path`, which is an instance of the
-/// mesh `group_path` in a group whose root path is `root`. Each visibility bit comes from the rule
-/// of the nearest prim, among the object and its ancestors, that sets the bit.
+/// Returns the visibility of the object with the path `object_path`. The object is an instance of
+/// the mesh `group_path` in a group with the root path `root`. Each visibility bit comes from the
+/// rule of the nearest prim, among the object and its ancestors, that sets the bit.
 uint32_t visibility_of(const Rules& rules, std::string_view object_path,
                        std::string_view group_path, std::string_view root) {
   uint32_t specified = 0, bits = 0;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Visibility of objects to kinds of rays, set for prim paths as seen through instances.
+/// Visibility of objects for kinds of rays. Visibility is set for prim paths as seen through
+/// instances.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +12,7 @@ namespace wavecomb {
 class ObjectNames;
 class Scene;
 
-/// Kinds of rays as bits, and the holdout flag.
+/// Bits for the kinds of rays, and the holdout flag.
 enum RayVisibility : uint32_t {
   kVisibleToCamera = 1,
   kVisibleToShadowRays = 2,
@@ -21,9 +22,9 @@ enum RayVisibility : uint32_t {
   kHoldout = 8,
 };
 
-/// Visibility rule for a prim and for those of its descendants that have no rule. For prims inside
-/// a group, the path is that of the group's first placement, and the rule applies to all of its
-/// placements.
+/// Visibility rule for a prim, and for all descendants that do not have another rule. For prims
+/// inside a group, the path is as seen through the group's first placement, and the rule applies to
+/// all placements.
 struct VisibilityRule {
   std::string path;
   uint32_t specified = 0;  ///< mask of the RayVisibility bits that the rule sets

@@ -24,8 +24,8 @@ size_t Chooser::choose(uint32_t depth, std::span<const Work> work) {
     }
   }
   if (calls % kRetryPeriod != 0) return best;
-  // Retry an arm whose prediction is nearly as good as the best one, and rarely any other arm,
-  // since other programs on the machine may have caused its slow measurement.
+  // Retry an arm if its predicted time is nearly the best. Any other arm is retried rarely, because
+  // its slow measurement may have been caused by other programs on the machine.
   const uint32_t turn = calls / kRetryPeriod;
   const size_t other = turn % arms_;
   if (turn / arms_ % kExplorePeriod == kExplorePeriod - 1) return other;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Online choice among several ways to do the same work, by measured time.
+/// Online choice among several ways to do the same work, based on measured times.
 #pragma once
 
 #include <array>
@@ -21,9 +21,9 @@ struct Work {
 ///   packets * (ns per packet) + records * (ns per record to prepare)
 /// and chooses the arm with the smallest time. Both costs are exponential moving averages per path
 /// depth and arm. Arms without measurements are chosen first. Later the chooser occasionally
-/// retries an arm whose predicted time is nearly the best, since costs vary over the image, and
-/// rarely any other arm. Measurements are clamped to twice the average, since other programs on the
-/// machine may slow down a measurement.
+/// retries an arm whose predicted time is nearly the best, since costs vary over the image. It
+/// rarely retries any other arm. Measurements are clamped to twice the average, since other
+/// programs on the machine may slow down a measurement.
 ///
 /// Contract: owned by one worker. The choice affects render time but never the image.
 class Chooser {

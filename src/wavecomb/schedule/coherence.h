@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Statistics of the coherence of a shading order, measured on a sample of queues outside the timed
-/// phases.
+/// Statistics of the coherence of a shading order. They are measured for a sample of the queues,
+/// outside the timed phases.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@ struct CoherenceCounts {
   uint64_t records = 0;        ///< records in the measured queues
   uint64_t runs = 0;           ///< maximal runs of consecutive records of one material
   uint64_t pairs = 0;          ///< pairs of consecutive records in shading order
-  uint64_t same_material = 0;  ///< pairs that read the same material record, hence its cache lines
+  uint64_t same_material = 0;  ///< pairs that read the same material record
   uint64_t texture_pairs = 0;  ///< pairs in which both records read a texture
   /// Texture pairs with the same texture, tile, mip level and cell of the 128 x 128 uv grid.
   uint64_t same_texels = 0;
@@ -41,7 +41,7 @@ struct CoherenceCounts {
   }
 };
 
-/// Adds a queue to `counts` in shading order; an empty `order` means arrival order.
+/// Adds a queue to `counts` in shading order; an empty `order` stands for arrival order.
 void measure_coherence(std::span<const uint32_t> material, std::span<const uint32_t> texture_key,
                        std::span<const uint32_t> order, std::span<const MaterialTraits> materials,
                        CoherenceCounts& counts);

@@ -10,7 +10,8 @@ namespace wavecomb {
 /// Estimated cost of shading one record, in nanoseconds, frozen while a pass runs.
 struct CostSnapshot {
   std::vector<float> material_ns;  ///< by material
-  std::vector<float> texture_ns;   ///< by texture: mean cost of the records that read the texture
+  /// For each texture: mean cost of the records that read the texture.
+  std::vector<float> texture_ns;
   /// mean cost of the measured records; before the first measurement, mean over materials
   float mean_ns = 1;
 

@@ -30,7 +30,7 @@ CostPrediction merge_costs(const CostTracker& measured, std::span<const Material
                            float weight, CostSnapshot& costs) {
   CostPrediction prediction;
   double sum_w = 0, sum_measured = 0;
-  // sums over the materials with a cost estimate before this pass
+  // sums over the materials that had a cost estimate before this pass
   double compared_w = 0, compared = 0;
   for (size_t m = 0; m < materials.size(); ++m) {
     const auto w = static_cast<double>(measured.timed()[m]);

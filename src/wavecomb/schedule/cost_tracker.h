@@ -27,15 +27,15 @@ class CostTracker {
   /// is the mean time per record in nanoseconds.
   void charge(std::span<const uint32_t> materials, double ns);
   /// Adds `ns` nanoseconds that were spent on a material outside batches, for example on subsurface
-  /// random walks. This time is measured for all records of the material, not only for timed
-  /// batches.
+  /// random walks. This time covers all records of the material, not only records of timed batches.
   void charge_untimed(uint32_t material, double ns) { untimed_ns_[material] += ns; }
   /// Counts shading records by material, including records of batches that are not timed.
   void count(std::span<const uint32_t> materials) {
     for (uint32_t m : materials) ++record_counts_[m];
   }
-  /// Returns whether to time the next batch of `records`: one in 8 large batches and one in 32
-  /// small ones, so that reading the clock takes less than 1 % of shading time.
+  /// Returns whether to time the next batch, which has `records` records. Every 8th large batch and
+  /// every 32nd small batch is timed, so that reading the clock takes less than 1 % of shading
+  /// time.
   bool wants(size_t records) {
     return records >= 32 ? (++large_ & 7u) == 0 : (++small_ & 31u) == 0;
   }
@@ -58,8 +58,8 @@ class CostTracker {
 };
 
 /// Accuracy of the material costs that were predicted for a pass, compared with the costs measured
-/// in the pass. Only materials with both values count. The weight w of a material is its number of
-/// timed records.
+/// in the pass. Only materials with both a predicted and a measured cost are included. The weight w
+/// of a material is its number of timed records.
 struct CostPrediction {
   double r2 = 0;           ///< 1 - sum w (measured - predicted)^2 / sum w (measured - mean)^2
   double mean_error = 0;   ///< sum w |measured - predicted| / sum w measured
@@ -68,8 +68,8 @@ struct CostPrediction {
 
 /// Updates the snapshot with the measurements of the last pass:
 ///   cost <- (1 - weight) cost + weight * measured, or measured if there was no estimate (cost 0).
-/// The cost of a texture is the mean over the timed records of materials that read it. Returns the
-/// accuracy of the old snapshot.
+/// The cost of a texture is the mean over the timed records of the materials that read the texture.
+/// Returns the accuracy of the old snapshot.
 CostPrediction merge_costs(const CostTracker& measured, std::span<const MaterialTraits> materials,
                            float weight, CostSnapshot& costs);
 

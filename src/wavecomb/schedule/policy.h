@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Interface of scheduling policies: a policy chooses the order of a shading queue, nothing else.
+/// Interface of scheduling policies. A policy chooses the order of a shading queue and nothing
+/// else.
 #pragma once
 
 #include <cstdint>

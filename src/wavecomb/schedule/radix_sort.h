@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Stable radix sort used by all policies and ray orders.
+/// Stable radix sort for all scheduling policies and ray orders.
 #pragma once
 
 #include <cstddef>

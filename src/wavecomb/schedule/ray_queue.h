@@ -6,9 +6,9 @@
 
 namespace wavecomb {
 
-/// Rays in SoA layout and traversal order. All other path state stays in the path's slot of the
-/// pool. The order of the rays does not depend on the scheduling policy: rays are generated in slot
-/// order, and the rays of continuing paths keep their order.
+/// Rays in SoA layout and in traversal order. All other state of a path stays in the path's slot of
+/// the pool. The order of the rays does not depend on the scheduling policy: rays are generated in
+/// slot order, and the rays of continuing paths keep their order.
 ///
 /// Contract: owned by one wave; the first `size` entries of each array are valid; arrays are padded
 /// by one packet past the end.
@@ -25,7 +25,7 @@ class RayQueue {
   float *dx, *dy, *dz;     ///< unit direction
   uint32_t* slot;          ///< path slot in the pool
   uint32_t* ordered_slot;  ///< output buffer for reordered slots
-  uint32_t* direction;     ///< direction_key of each ray, written by shading
+  uint32_t* direction;     ///< direction_key() of each ray, written by shading
   size_t size = 0;
 
   static constexpr size_t kColumns = 9;

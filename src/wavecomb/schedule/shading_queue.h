@@ -44,8 +44,8 @@ class ShadingQueue {
   uint32_t* sorted_indices = nullptr;  ///< a permutation of 0 .. size-1 if `ordered` or `moved`
   bool ordered = false;                ///< whether sorted_indices gives the shading order of the
                                        ///< records
-  bool moved = false;  ///< whether records are in shading order; record i arrived as
-                       ///< sorted_indices[i]
+  /// Whether records are in shading order; the arrival index of record i is then sorted_indices[i].
+  bool moved = false;
 
   /// Path slot and shading outcome, always in arrival order.
   uint32_t *slot = nullptr, *outcome = nullptr;

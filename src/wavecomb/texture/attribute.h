@@ -56,7 +56,7 @@ inline void corner_values(const AttributeRecord& record, uint32_t prim, size_t (
 }  // namespace detail
 
 /// Writes `width` (1 to 4) components of attribute `id` to `out`, linearly interpolated between
-/// corners. Lanes whose mesh lacks the attribute, or has fewer components, keep their value.
+/// corners. In lanes whose mesh lacks the attribute or has fewer components, `out` does not change.
 ///
 /// Each lane may read a different array, so values are loaded one lane at a time. The interpolation
 /// is the same for packets and for scalar lanes.
@@ -77,7 +77,7 @@ inline void read_attribute(const AttributeView& view, uint32_t id, uint32_t widt
     const AttributeRecord* record = detail::find_attribute(view, mesh.value[i], id, width);
     if (record == nullptr) continue;
     found.value[i] = 1u;
-    // Hits at the ends of a curve may lie slightly beyond them.
+    // A hit at an end of a curve may lie slightly beyond the end.
     if (record->rate == AttributeRate::kEnd) {
       if (!(along[i] > 0.f)) along[i] = 0.f;
       if (along[i] > 1.f) along[i] = 1.f;

@@ -7,7 +7,7 @@
 namespace wavecomb {
 
 inline constexpr uint32_t kNoAttribute = 0xffffffffu;
-/// Mesh index that means "no attributes" in every scene.
+/// Mesh index of points without a mesh, which have no attributes in any scene.
 inline constexpr uint32_t kNoMesh = 0xffffffffu;
 
 /// Interpolation of an attribute.

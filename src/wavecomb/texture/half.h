@@ -7,7 +7,7 @@
 namespace wavecomb {
 
 /// Converts the half in the low 16 bits to float. The conversion is exact, including infinities and
-/// NaN. Uses no denormal floats, so that flush-to-zero modes have no effect.
+/// NaN. The computation uses no denormal floats, so that flush-to-zero modes have no effect.
 template <typename F>
 inline F half_to_float(const UInt<F>& half) {
   const UInt<F> exponent = half & 0x7c00u;
@@ -20,8 +20,8 @@ inline F half_to_float(const UInt<F>& half) {
   return bits_float<F>(bits | ((half & 0x8000u) << 16));
 }
 
-/// Converts to the nearest half, ties to even. Overflow gives infinity; NaN stays NaN. Branch-free,
-/// so that compilers vectorise loops over it.
+/// Converts to the nearest half, ties to even. Overflow gives infinity; NaN stays NaN. The function
+/// has no branches, so that compilers vectorise loops that call it.
 inline uint16_t float_to_half(float x) {
   const uint32_t bits = float_bits<float>(x);
   const uint32_t sign = (bits >> 16) & 0x8000u;

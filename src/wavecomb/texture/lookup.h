@@ -11,9 +11,9 @@ namespace wavecomb {
 /// Filter footprint of a lookup.
 ///
 /// A trilinear filter is a weighted mean of up to eight texels, four in each of two levels.
-/// Stochastic filtering reads only one texel, chosen with its filter weight as probability, and
-/// gives the same result on average (M. Pharr, B. Wronski, M. Salvi, M. Fajardo, "Filtering After
-/// Shading With Stochastic Texture Filtering", Proc. ACM CGIT 7(1), 2024).
+/// Stochastic filtering reads only one texel, which is chosen with a probability equal to its
+/// filter weight. On average, the result is the same (M. Pharr, B. Wronski, M. Salvi, M. Fajardo,
+/// "Filtering After Shading With Stochastic Texture Filtering", Proc. ACM CGIT 7(1), 2024).
 template <typename F>
 struct Footprint {
   F width;  ///< in uv units
@@ -23,7 +23,7 @@ struct Footprint {
 
   /// Makes a footprint for full filtering.
   Footprint(const F& w) : width(w) {}  // NOLINT(google-explicit-constructor)
-  /// Makes a footprint for stochastic filtering with the bits of `random`.
+  /// Makes a footprint for stochastic filtering with the random bits `random`.
   Footprint(const F& w, const UInt<F>& random) : width(w), one_texel(true), bits(random) {}
 
   /// Returns the footprint for texture coordinates that are scaled by `factor`.
@@ -32,8 +32,8 @@ struct Footprint {
     f.width = width * factor;
     return f;
   }
-  /// Converts the `n` random bits from bit `first` on to a number in (0, 1), at the middle of an
-  /// interval of length 2^-n.
+  /// Converts `n` random bits, starting at bit `first`, to a number in (0, 1). The number is the
+  /// middle of an interval of length 2^-n.
   F number(int first, int n) const {
     const UInt<F> part = (bits >> first) & ((1u << n) - 1u);
     return F(F(Int<F>(part)) + 0.5f) * (1.f / static_cast<float>(1u << n));
@@ -63,13 +63,13 @@ inline uint32_t first_of(const UInt<F>& value, const Mask<F>& active) {
 
 }  // namespace detail
 
-/// Looks up one texture, the same in all lanes, with trilinear filtering. `s`, `t`: texture
-/// coordinates with t up (USD convention: (0, 0) is the lower left corner of the image, texel
-/// centres are at half texels). The footprint's width selects the mip level, lod = log2(width *
-/// max(texture width, height)), clamped; width <= 0 or NaN reads the finest level. Any s and t are
-/// valid; NaN counts as 0. With Wrap::kBlack, taps outside the image are black, and transparent if
-/// the texture has alpha. The result of inactive lanes is unspecified. UDIM textures read the tile
-/// that contains (s, t), or the value for missing tiles.
+/// Looks up one texture, the same in all lanes, with trilinear filtering. `s` and `t` are texture
+/// coordinates with t up. By USD's convention, (0, 0) is the lower left corner of the image, and
+/// texel centres are at half texels. The footprint's width selects the mip level lod = log2(width *
+/// max(texture width, height)), clamped to the existing levels; width <= 0 or NaN reads the finest
+/// level. Any s and t are valid; NaN counts as 0. With Wrap::kBlack, taps outside the image are
+/// black, and transparent if the texture has alpha. The result of inactive lanes is unspecified.
+/// For UDIM textures, reads the tile that contains (s, t), or returns the value of missing tiles.
 template <typename F>
 Texel<F> lookup(const TextureView& texture, const F& s, const F& t, const Footprint<F>& footprint,
                 const Mask<F>& active);

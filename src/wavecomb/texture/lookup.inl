@@ -78,8 +78,8 @@ inline Taps<F> make_taps(Wrap wrap, const F& x, const UInt<F>& size) {
   const Mask<F> a_low = Mask<F>(a < zero), b_high = Mask<F>(b > last);
   Taps<F> taps{UInt<F>(0u), UInt<F>(0u), F(x - base), Mask<F>(true), Mask<F>(true)};
   if (wrap == Wrap::kRepeat) {
-    // The lower tap a lies in [-1, size - 1], or is `size` after rounding; the upper tap is b = a
-    // + 1.
+    // The lower tap a lies in [-1, size - 1], or is equal to `size` due to rounding. The upper tap
+    // is b = a + 1.
     const Int<F> a_in = select(Mask<F>(a > last), zero, a);
     taps.i0 = UInt<F>(select(a_low, last, a_in));
     taps.i1 = UInt<F>(select(
@@ -241,15 +241,15 @@ inline Texel<F> lookup_plain(const TextureView& texture, const F& s, const F& t,
 }
 
 /// Implements `lookup` for a UDIM texture: calls `lookup_plain` once for each tile that active
-/// lanes read. A point on the border of two tiles belongs to the upper or right tile. Filters do
-/// not cross borders.
+/// lanes read. A point on the border of two tiles belongs to the tile above or to the right.
+/// Filters do not cross borders.
 template <typename F>
 [[gnu::noinline]] Texel<F> lookup_tiles(const TextureView& texture, const F& s, const F& t,
                                         const Footprint<F>& footprint, const Mask<F>& active) {
   using U = UInt<F>;
   const F zero(0.f), columns(static_cast<float>(TileSet::kColumns));
-  // NaN becomes 0. Coordinates far outside the tiles are clamped so that they fit an integer and
-  // remain outside.
+  // NaN becomes 0. Coordinates far outside the tiles are clamped to values that fit an integer and
+  // are still outside.
   const auto clean = [&](const F& x) { return clamp(select(x == x, x, zero), F(-1.f), columns); };
   const F column = floor(clean(s)), row = floor(clean(t));
   const Mask<F> inside =

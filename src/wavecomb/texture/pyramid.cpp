@@ -27,7 +27,7 @@ struct Box {
 std::vector<Box> make_boxes(uint32_t size, uint32_t n) {
   std::vector<Box> boxes(n);
   for (uint64_t i = 0; i < n; ++i) {
-    // Integer arithmetic in units of 1 / n source texels is exact.
+    // Integers in units of 1 / n source texels make this computation exact.
     const uint64_t begin = i * size, end = begin + size;
     boxes[i].first = static_cast<uint32_t>(begin / n);
     for (uint64_t j = begin / n; j * n < end; ++j) {
@@ -59,7 +59,7 @@ void average_rows(const float* a, const float* b, size_t n, float* to) {
     for (uint32_t c = 0; c < C; ++c) {
       const float upper = 0.5f * a[2 * x * C + c] + 0.5f * a[2 * x * C + C + c];
       const float lower = 0.5f * b[2 * x * C + c] + 0.5f * b[2 * x * C + C + c];
-      // Adding 0 turns -0 into 0, as in add_row, whose sums start from 0.
+      // Adding 0 turns -0 into 0. In add_row(), this happens because sums start from 0.
       to[x * C + c] = 0.5f * upper + 0.5f * lower + 0.f;
     }
 }
@@ -130,7 +130,8 @@ class Pyramid {
 
   size_t row_size(uint32_t level) const { return size_t{view_.levels[level].width} * channels_; }
 
-  /// Zeroes the levels that do not fill their edge tiles, so that texels outside the image are 0.
+  /// Sets all levels that do not fill their edge tiles to 0, so that texels outside the image are
+  /// 0.
   void clear_margins() {
     for (uint32_t n = 0; n < view_.level_count; ++n) {
       const TextureLevel& level = view_.levels[n];

@@ -17,7 +17,8 @@ namespace wavecomb {
 /// the comparisons vectorise.
 ///
 /// 8-bit values are compared as stored codes, since the codes have the same order as the values and
-/// take less memory. Half values are compared as floats, since the order of their codes differs.
+/// take less memory. Half values are compared as floats, since the order of their codes differs
+/// from the order of the values.
 template <typename T, size_t C, size_t kRow>
 class RowRange {
   static constexpr bool kByCode = std::is_same_v<T, uint8_t>;
@@ -36,8 +37,8 @@ class RowRange {
       row_values = codes;
     else
       row_values = values;
-    // Local copies of the ranges do not alias and have a fixed length, so that the loops compile to
-    // a few comparisons.
+    // Local copies of the ranges have no aliases and a fixed length, so that the loops compile to a
+    // few comparisons.
     Value all[kRow];
     if (n == kRow) {
       std::copy_n(row_values, kRow, all);

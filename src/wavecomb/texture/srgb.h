@@ -14,7 +14,8 @@ namespace detail {
 constexpr double srgb_to_linear(double c) {
   if (c <= 0.04045) return c / 12.92;
   const double x = (c + 0.055) / 1.055;
-  // x^2.4 = x^2 y, where y is the fifth root of x^2, by Newton's method starting above the root.
+  // x^2.4 = x^2 y, where y is the fifth root of x^2. Newton's method computes y, starting above the
+  // root.
   const double x2 = x * x;
   double y = 1;
   for (int i = 0; i < 60; ++i) y -= (y * y * y * y * y - x2) / (5 * y * y * y * y);
@@ -41,8 +42,8 @@ namespace detail {
 /// codes.
 inline constexpr std::array<float, 256> kSrgbSteps = make_srgb_table(0.5);
 
-/// Buckets of floats from 2^-13 to 1 by exponent and 8 mantissa bits. Each bucket holds at most one
-/// rounding boundary.
+/// The floats from 2^-13 to 1 are divided into buckets by exponent and 8 mantissa bits. Each bucket
+/// holds at most one rounding boundary.
 inline constexpr int kSrgbBucketShift = 23 - 8;
 inline constexpr uint32_t kSrgbFirstBits = (127u - 13u) << 23;
 inline constexpr uint32_t kSrgbBuckets = (13u << 8) + 1;

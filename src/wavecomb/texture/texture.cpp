@@ -41,7 +41,7 @@ void check(const TextureDesc& desc) {
 /// A filter interpolates a + (b - a) t up to three times with t in [0, 1]. If all texels are equal,
 /// the interpolation is exact; otherwise each step adds at most two rounding errors. Rounding does
 /// not change the sign of a result: for a and b >= 0, the rounded b - a is at least -a, and
-/// therefore so is its product with t.
+/// therefore its product with t is at least -a as well.
 TexelRange filtered(const TexelRange& texels) {
   constexpr float kRoundings = 1e-6f;
   TexelRange range = texels;

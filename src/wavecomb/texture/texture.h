@@ -103,13 +103,14 @@ class Texture {
   /// Builds a texture with its mip pyramid from an image. Values that are not finite become 0 and
   /// are counted. Throws Error naming desc.name if a side is 0 or above kMaxSize, channels or data
   /// are invalid, or the levels need 8 GiB or more or have more than 2^32 texels. `for_each` may
-  /// process rows on several threads without changing the result. If `store` is not null, it holds
-  /// the levels and limits their memory.
+  /// process rows on several threads without changing the result. If `store` is not null, the
+  /// levels are kept in this store, which limits their memory.
   explicit Texture(const TextureDesc& desc, const ForEach& for_each = in_order,
                    std::shared_ptr<TileStore> store = nullptr);
   /// Creates a UDIM texture from `tiles`, pairs of a tile number (1001 to 1100) and a shared
-  /// texture. `missing`: linear r, g, b, alpha of missing tiles. Throws Error naming `name` if
-  /// there are no tiles, a number is out of range or repeated, or a tile is itself a UDIM texture.
+  /// texture. `missing` is the linear r, g, b, alpha of missing tiles. Throws Error naming `name`
+  /// if there are no tiles, a number is out of range or repeated, or a tile is itself a UDIM
+  /// texture.
   Texture(std::string name,
           const std::vector<std::pair<uint32_t, std::shared_ptr<const Texture>>>& tiles,
           const std::array<float, 4>& missing);
@@ -127,9 +128,10 @@ class Texture {
   /// Mean of the finest level, linear r, g, b, a.
   const float* mean() const { return mean_; }
   /// Bounds of all lookups with any coordinates, footprint and filter. The bounds cover the stored
-  /// texels of all levels, and black if the wrap mode returns it outside the image. Unless all
+  /// texels of all levels, and black if the wrap mode returns black outside the image. Unless all
   /// texels are equal, the bounds are slightly wider than the range of the texels, since filtering
-  /// rounds. The bounds never have a sign that no texel has.
+  /// rounds. The lower bound is negative only if a texel is negative, and the upper bound is
+  /// positive only if a texel is positive.
   const TexelRange& range() const { return range_; }
   /// Number of values of the finest level that were infinite or NaN and became 0.
   uint64_t nonfinite_count() const { return nonfinite_count_; }

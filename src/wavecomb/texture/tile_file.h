@@ -9,8 +9,8 @@
 
 namespace wavecomb {
 
-/// Temporary file without a name. The file disappears when it is closed or when the process ends in
-/// any way.
+/// Temporary file without a name. The file is deleted when it is closed, and also when the process
+/// ends in any way.
 ///
 /// Contract: all members may be called concurrently.
 class TileFile {
@@ -27,7 +27,7 @@ class TileFile {
   [[nodiscard]] bool read(std::byte* to, size_t bytes, uint64_t offset) const;
   /// Frees the disk space of a range that is no longer needed.
   void discard(uint64_t offset, uint64_t bytes);
-  /// End of the last byte ever written.
+  /// Offset after the last byte ever written.
   uint64_t bytes() const { return bytes_; }
 
  private:

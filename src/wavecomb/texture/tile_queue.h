@@ -10,8 +10,8 @@ namespace wavecomb {
 
 /// Order in which resident tiles are evicted, kept as two queues of tiles. Only cache misses change
 /// the order, because reads of resident tiles cannot be observed. The second queue is for
-/// frequently read tiles. A loaded tile enters the second queue if fewer tiles were evicted since
-/// its own eviction than fit in memory. Tiles of the first queue are evicted first. The policy
+/// frequently read tiles. A loaded tile enters the second queue if, since its last eviction, fewer
+/// tiles were evicted than fit in memory. Tiles of the first queue are evicted first. The policy
 /// follows 2Q (Johnson and Shasha, VLDB 1994) and the refault distance of the Linux kernel.
 class TileQueue {
  public:

@@ -66,7 +66,7 @@ uint64_t TileStore::resident_bytes() const {
 
 size_t TileStore::tile_limit() const {
   // Minimum number of tiles in memory, so that concurrent readers do not evict each other's tiles
-  // for ever.
+  // endlessly.
   constexpr size_t kLeast = 32;
   const uint64_t own = std::min(queue_.bytes() + counts_.grid_bytes, limit_bytes_);
   return std::max<size_t>(kLeast, (limit_bytes_ - own) / tile_bytes_);
@@ -240,7 +240,7 @@ void TileStore::spill() {
     file->write(address(first), bytes, offset);
     file->write(nothing.data(), range.count * tile_bytes_ - bytes, offset + bytes);
   }
-  // Start the threads before memory is released, since only they can bring tiles back.
+  // Start the threads before memory is released, since only these threads can load tiles again.
   start_loaders();
   for (const auto& [first, range] : ranges_)
     faults_.release(address(first), range.count * tile_bytes_);
@@ -254,7 +254,7 @@ void TileStore::start_loaders() {
   if (!loaders_.empty()) return;
   buffers_.resize(count * tile_bytes_);
   loaders_.reserve(count);
-  // Block signals in the new threads, so that the existing threads handle them.
+  // Block signals in the new threads, so that the existing threads handle all signals.
   sigset_t all, before;
   sigfillset(&all);
   pthread_sigmask(SIG_SETMASK, &all, &before);
@@ -277,7 +277,8 @@ void TileStore::put(const std::byte* at, const std::byte* from, size_t bytes) {
 void TileStore::evict_tiles() {
   uint32_t tile;
   while (queue_.resident() > tile_limit() && queue_.release(tile)) {
-    // Keep the lock during the call, so that the state of a tile always matches its memory.
+    // Keep the lock during the call, so that the recorded state of a tile always matches its
+    // memory.
     faults_.release(address(tile), tile_bytes_);
     ++counts_.releases;
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Storage of textures within a memory limit, which is shared with volume grids; textures that do
-/// not fit are in a temporary file.
+/// Storage of textures within a memory limit that textures share with volume grids. Textures that
+/// do not fit are stored in a temporary file.
 #pragma once
 
 #include <atomic>
@@ -27,14 +27,14 @@ struct StoreStatistics {
   uint64_t file_bytes = 0;      ///< size of the temporary file; 0 if everything fits in memory
   uint64_t resident_bytes = 0;  ///< memory in use, including the store's own tables
   uint64_t peak_bytes = 0;      ///< maximum of resident_bytes
-  uint64_t grid_bytes = 0;      ///< memory of volume grids, which reduces the room for textures
+  uint64_t grid_bytes = 0;      ///< memory of volume grids; textures get less memory by this amount
   uint64_t loads = 0;           ///< number of tiles read back from the file
   uint64_t releases = 0;        ///< number of tiles evicted
   double load_s = 0;            ///< seconds spent reading back, summed over threads
 };
 
-/// Texture memory of which at most `limit_bytes`, including volume grids, is resident. Grids stay
-/// in memory as a whole; their size reduces the room for textures, down to a few tiles.
+/// Texture memory with at most `limit_bytes` resident bytes, including volume grids. Grids stay in
+/// memory as a whole; their size reduces the room for textures, down to a few tiles.
 ///
 /// Readers use plain pointers. While all textures fit, they stay in memory. When a texture does not
 /// fit, the store writes all textures to a temporary file. From then on, reading an absent tile of
@@ -46,25 +46,26 @@ struct StoreStatistics {
 /// page faults in its own code, so never pass texture memory to a system call.
 class TileStore {
  public:
-  /// Size of a store tile, the unit of transfer between memory and file: 64 texel tiles of a
-  /// TextureView with four 8-bit channels.
+  /// Size of a store tile, the unit of transfer between memory and file. If texels have four 8-bit
+  /// channels, a store tile holds 64 of the texel tiles of a TextureView.
   static constexpr size_t kTileBytes = 16384;
   /// Smallest memory limit, which leaves room for a few tiles of each reader.
   static constexpr uint64_t kMinBytes = 1'000'000;
 
-  /// `folder`: for the temporary file, which may grow to the size of all textures. Throws Error if
-  /// the limit is below kMinBytes or the system lacks support (UserFaults::unsupported_reason).
+  /// `folder` is the folder of the temporary file, which may grow to the size of all textures.
+  /// Throws Error if the limit is below kMinBytes or the system lacks support
+  /// (UserFaults::unsupported_reason).
   TileStore(uint64_t limit_bytes, std::string folder);
   ~TileStore();
   TileStore(const TileStore&) = delete;
   TileStore& operator=(const TileStore&) = delete;
 
-  /// Sets the size of the images from which textures will be built, which are in memory outside the
-  /// store.
+  /// Sets the size of the images from which textures will be built. These images are in memory
+  /// outside the store.
   void set_waiting(uint64_t bytes);
   /// Announces that a texture is being built, which uses `bytes` and `scratch_bytes` outside the
-  /// store, in addition to set_waiting(). Throws Error if textures must move to the file and
-  /// cannot.
+  /// store, in addition to set_waiting(). Throws Error if textures must move to the file but this
+  /// fails.
   void expect(uint64_t bytes, uint64_t scratch_bytes);
   /// Stores a copy of `data` and returns its address, valid until remove(). Throws Error if there
   /// is no room.
@@ -80,8 +81,8 @@ class TileStore {
 
   uint64_t limit_bytes() const { return limit_bytes_; }
   StoreStatistics statistics() const;
-  /// Throws Error if a tile could not be read back or there was no memory for it. Tiles that cannot
-  /// be read are black.
+  /// Throws Error if a tile could not be read from the file, or if there was no memory for a tile.
+  /// Such tiles are black.
   void check() const;
 
  private:
@@ -104,7 +105,7 @@ class TileStore {
   void spill_before(uint64_t more);
   /// Number of tiles that fit within the limit.
   size_t tile_limit() const;
-  /// Evicts tiles until the resident ones fit.
+  /// Evicts tiles until the resident tiles fit within the limit.
   void evict_tiles();
   /// Moves all textures to the temporary file. Throws Error on failure.
   void spill();
@@ -141,7 +142,7 @@ class TileStore {
   /// Cause of the first failure to load a tile.
   enum class Failure : uint8_t { kNone, kFile, kMemory };
   std::atomic<Failure> failure_{Failure::kNone};
-  int reason_ = 0;                  ///< errno of a failure to get memory
+  int reason_ = 0;                  ///< errno of a failed allocation
   std::vector<std::byte> buffers_;  ///< buffer of one tile per keeper thread
   std::vector<std::thread> loaders_;
 };

@@ -79,7 +79,7 @@ const std::byte* UserFaults::map(size_t bytes) {
   if (at == MAP_FAILED)
     throw Error(std::string("no address space for textures (") + std::strerror(errno) + ")");
   maps_.emplace_back(static_cast<std::byte*>(at), bytes);
-  // Exclude the range from forks, since the child would read zeros in unfilled pages.
+  // Exclude the range from forks, since the child process would read zeros in unfilled pages.
   ::madvise(at, bytes, MADV_DONTFORK);
   ::madvise(at, bytes, MADV_NOHUGEPAGE);
   uffdio_register range{};
@@ -98,15 +98,15 @@ int UserFaults::fill(const std::byte* at, const std::byte* from, size_t bytes) n
     copy.len = bytes - done;
     if (::ioctl(faults_, UFFDIO_COPY, &copy) == 0) return 0;
     if (errno != EAGAIN) return errno;
-    // The kernel stopped because mappings changed concurrently; continue after the part that was
-    // copied.
+    // The kernel stopped early because mappings changed concurrently; continue after the copied
+    // part.
     if (copy.copy > 0) done += static_cast<size_t>(copy.copy);
   }
   return 0;
 }
 
 void UserFaults::abandon(const std::byte* at, size_t bytes) noexcept {
-  // From here on the kernel fills the range with zero pages like other memory.
+  // After this call, the kernel fills the range with zero pages, as it does for ordinary memory.
   uffdio_range range{number(at), bytes};
   ::ioctl(faults_, UFFDIO_UNREGISTER, &range);
   wake(at, bytes);
@@ -137,7 +137,7 @@ size_t UserFaults::wait(const std::byte** addresses) noexcept {
       if (messages[i].event == UFFD_EVENT_PAGEFAULT)
         addresses[count++] =
             reinterpret_cast<const std::byte*>(uintptr_t{messages[i].arg.pagefault.address});
-    if (count > 0) return count;  // If nothing was read, another thread took the events.
+    if (count > 0) return count;  // If nothing was read, another thread has read the events.
   }
 }
 

@@ -16,7 +16,8 @@ namespace wavecomb {
 /// cannot read unfilled pages, so never pass them to a system call.
 class UserFaults {
  public:
-  /// Returns a short reason why the system does not support demand-filled memory, or "" if it does.
+  /// Returns a short reason why the system does not support demand-filled memory, or "" if the
+  /// system supports it.
   static std::string unsupported_reason();
 
   /// If the system does not support demand-filled memory, throws Error with the reason.
@@ -29,11 +30,11 @@ class UserFaults {
   /// Maps a new range of read-only address space, which is valid until this object is destroyed.
   /// Throws Error if no address space is left.
   const std::byte* map(size_t bytes);
-  /// Copies `from` to an unfilled range and wakes the threads that wait for it. Returns 0 on
-  /// success and errno on failure. After a failure, part of the range may be filled.
+  /// Copies `from` to an unfilled range and wakes the threads that wait for this range. Returns 0
+  /// on success and errno on failure. After a failure, part of the range may be filled.
   [[nodiscard]] int fill(const std::byte* at, const std::byte* from, size_t bytes) noexcept;
   /// Resumes threads that wait for a range that cannot be filled. Unfilled pages read as zero.
-  /// Needs no memory.
+  /// Allocates no memory.
   void abandon(const std::byte* at, size_t bytes) noexcept;
   /// Frees the memory of a range; a thread that reads the range blocks again.
   void release(const std::byte* at, size_t bytes) noexcept;
@@ -41,8 +42,8 @@ class UserFaults {
   void wake(const std::byte* at, size_t bytes) noexcept;
   /// Maximum number of addresses returned by one wait().
   static constexpr size_t kMaxAddresses = 16;
-  /// Blocks until a thread reads an unfilled page. Writes up to kMaxAddresses addresses that
-  /// threads wait for to `addresses` and returns their number, or 0 after stop().
+  /// Blocks until a thread reads an unfilled page. Threads wait for certain addresses; writes up to
+  /// kMaxAddresses of them to `addresses` and returns their number, or 0 after stop().
   size_t wait(const std::byte** addresses) noexcept;
   /// Ends all current and future wait() calls.
   void stop();

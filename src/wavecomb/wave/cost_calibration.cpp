@@ -6,7 +6,7 @@
 namespace wavecomb {
 namespace {
 
-/// Largest number of instances to search. This number suffices to find every material of a typical
+/// Maximum number of instances to search. This number suffices to find every material of a typical
 /// scene and takes negligible time.
 constexpr size_t kMaxInstances = 1 << 14;
 /// Number of faces to inspect in each mesh, evenly spaced.

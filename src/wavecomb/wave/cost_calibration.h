@@ -29,7 +29,7 @@ struct CalibrationHits {
 /// are distributed over the meshes with this material.
 std::vector<CalibrationHits> find_calibration_hits(const Scene& scene);
 
-/// Returns the properties of the scene's materials that policies may use.
+/// Returns the material properties that scheduling policies may use.
 std::vector<MaterialTraits> material_traits(const Scene& scene);
 
 /// Returns modelled costs: a fixed cost for each program and for each texture lookup, so that

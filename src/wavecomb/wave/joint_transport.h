@@ -9,8 +9,8 @@
 ///   WaveTask::joint      marks tasks that trace light paths instead of camera paths
 ///   JointStages          additional wave stages (wave/run_wave.h), chosen in wave/wave.lanes.cpp
 ///
-/// The settings of the joint transport are rows of core/settings_table.cpp, its kernels are a row
-/// of wave/kernels/kernel_matrix.h, and render/joint_transport.h registers its passes and pilots.
+/// The joint transport's settings are rows of core/settings_table.cpp, and its kernels are a row of
+/// wave/kernels/kernel_matrix.h. Its passes and pilots are registered in render/joint_transport.h.
 #pragma once
 
 #include "wavecomb/light_paths/coupling.h"

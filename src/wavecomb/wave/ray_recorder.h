@@ -13,8 +13,8 @@ namespace wavecomb {
 ///
 /// Contract: all workers call the recorder concurrently. `wave` is the address of the worker's
 /// buffers, and calls with the same `wave` never overlap. The arrays are valid only during the
-/// call. A recorder may allocate and throw, since it serves measurements only. The reference
-/// integrator, which traces single rays, does not call recorders.
+/// call. A recorder may allocate memory and throw exceptions, since it is used only for
+/// measurements. The reference integrator, which traces single rays, does not call recorders.
 class RayRecorder {
  public:
   virtual ~RayRecorder() = default;

@@ -34,8 +34,8 @@ struct CameraPaths {
     wave.counts.samples += task.path_count();
   }
   /// Returns whether to trace the camera rays as coherent packets. All rays of a pinhole camera
-  /// start in one point; for such rays, coherent packets find the same hits as single rays. For
-  /// rays from several points, hits at edges may differ (canonical-hits.md).
+  /// start at the same point. For such rays, coherent packets find the same hits as single rays.
+  /// For rays from several points, hits at edges may differ (canonical-hits.md).
   static bool are_coherent(const WaveContext& context) { return context.camera->is_pinhole(); }
   static ShadeSettings settings(const WaveContext& context) {
     return ShadeSettings(*context.settings);

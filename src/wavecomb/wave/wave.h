@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Wave: a batch of paths, for a number of pixels and samples, that are traced together. One worker
+/// Wave: a batch of paths that are traced together, for a number of pixels and samples. One worker
 /// traces the paths of a wave to their end, using only its own buffers.
 #pragma once
 
@@ -47,16 +47,18 @@ struct WaveContext {
   const CostSnapshot* costs;           ///< for scheduling policies
   const CostSnapshot* roulette_costs;  ///< costs for cost-aware roulette
   OrderGrid grid;                      ///< grid for ray orders and hit positions
-  Film* film;                          ///< film that waves write; no two waves write the same pixel
+  /// Film that waves write; only light paths of different waves may write the same pixel.
+  Film* film;
   uint32_t traversal_width;
   bool wants_position;                 ///< whether some policy reads position keys
   bool measures_costs;                 ///< whether to measure the time of shading batches
   RayRecorder* recorder;               ///< receives all rays in benchmarks, otherwise null
   const AovTables* aovs = nullptr;     ///< object names and groups for AOVs; null if unused
   HistoryReader* histories = nullptr;  ///< receives vertices of finished paths; null if unused
-  /// guiding field, used or trained by this pass; null without guiding
+  /// guiding field that this pass uses or trains; null without guiding
   const GuidingView* guide = nullptr;
-  bool discards = false;  ///< whether paths only produce `histories` and are not added to the film
+  /// Whether paths are only passed to `histories` and not added to the film.
+  bool discards = false;
   JointTransport::Context joint{};  ///< transport that is combined with camera paths, if any
 
   /// Returns whether the scene has volumes, nested dielectrics or subsurface scattering.
@@ -123,20 +125,21 @@ struct Wave {
   SoaBlock times;     ///< shutter times of the traced rays, if the scene has motion
   SoaBlock walks;     ///< subsurface random walks (medium/subsurface/walk_queue.h)
   SoaBlock segments;  ///< free flights in volumes (medium/wave/volumes.h)
-  NestedMediaBuffers nested_media;  ///< buffers of the medium stack (medium/nested/nested_media.h)
+  /// Buffers for nested dielectrics (medium/nested/nested_media.h).
+  NestedMediaBuffers nested_media;
   RadixSorter sorter, ray_sorter;
   std::vector<uint32_t> ray_indices;  ///< padded by one packet
   std::vector<float> scratch;  ///< one value for each material, which scheduling policies may use
   CostTracker costs;
   Chooser policy_chooser, ray_chooser, shadow_chooser;
   CoherenceCounts coherence;
-  /// Number of shading queues so far. Coherence is measured for every seventeenth of them.
+  /// Number of shading queues so far. Coherence is measured for every seventeenth queue.
   uint32_t queues = 0;
   PhaseClock clock;
   Counts counts;
   JointTransport::Buffers joint;
 
-  /// Returns the receiver of the events of the wave's camera paths.
+  /// Returns the object that records the events of the wave's camera paths.
   PathEvents events(const WaveContext& context) {
     return {context.scene, *context.camera, aovs, history, pool.radiance};
   }
@@ -148,8 +151,8 @@ struct Wave {
   }
 };
 
-/// Runs a wave with kernels of `W` lanes: generate -> (trace -> policy -> shade -> shadow)* ->
-/// resolve. task.joint selects the joint transport.
+/// Runs a wave with kernels of `W` lanes: generate -> (trace -> collect -> order -> shade ->
+/// shadow)* -> resolve. If task.joint is set, the wave traces paths of the joint transport.
 template <size_t W>
 void run_wave(Wave& wave, const WaveContext& context, const WaveTask& task);
 

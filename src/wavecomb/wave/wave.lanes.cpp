@@ -17,8 +17,8 @@ void run_wave(Wave& wave, const WaveContext& context, const WaveTask& task) {
   run_wave_through<Lanes<W>, LightPathJointStages<Lanes<W>>>(wave, context, task, NoMedia());
 }
 
-/// Shades `records` synthetic hits of one material to measure its cost before the first pass.
-/// Returns the time in nanoseconds. The film and the statistics do not change.
+/// Shades the synthetic hits of one material to measure its cost before the first pass. Returns the
+/// time in nanoseconds. The film and the statistics do not change.
 template <size_t W>
 double time_material(Wave& wave, const WaveContext& context, const CalibrationHits& hits) {
   using F = Lanes<W>;
@@ -28,8 +28,8 @@ double time_material(Wave& wave, const WaveContext& context, const CalibrationHi
   queue.clear();
   queue.size = hits.count;
   for (uint32_t i = 0; i < hits.count; ++i) {
-    // Directions and positions of the hits come from a golden-ratio sequence. The path state
-    // corresponds to paths after one bounce.
+    // Directions and positions of the hits come from a low-discrepancy sequence. The path state is
+    // typical of paths after one bounce.
     const float a = 0.61803399f * static_cast<float>(i), b = 0.75487767f * static_cast<float>(i);
     const float u = a - std::floor(a), v = b - std::floor(b);
     const Vec3<float> d = square_to_sphere(u, v);

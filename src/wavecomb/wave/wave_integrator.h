@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Wave integrator: each worker runs waves on its own buffers, with the kernels of one lane width.
+/// Wave integrator: each worker runs waves in separate buffers, with the kernels of one lane width.
 #pragma once
 
 #include <memory>
@@ -25,7 +25,7 @@ class WaveIntegrator final : public Integrator {
   const WaveContext& context_;
   RunWave run_wave_;
   uint32_t lanes_, wave_size_;
-  /// Indexed by worker. Each worker's thread allocates its wave.
+  /// Indexed by worker. The thread of each worker allocates the worker's wave.
   std::vector<std::unique_ptr<Wave>> waves_;
 };
 

@@ -15,8 +15,8 @@ struct FixedPoint {
   /// values cannot overflow.
   static constexpr int64_t kMax = int64_t{1} << 41;
 
-  /// Converts a real number to the nearest fixed-point number, and to the even one if two are
-  /// equally near. Clamps the result to [-kMax, kMax] and converts NaN to 0.
+  /// Rounds a real number to the nearest fixed-point number; ties are rounded to even. Clamps the
+  /// result to [-kMax, kMax] and converts NaN to 0.
   int64_t from(float x) const {
     const double units = std::ldexp(double{x}, -exponent);
     constexpr auto most = static_cast<double>(kMax);

@@ -12,7 +12,7 @@
 
 namespace wavecomb {
 
-/// Code for a missing direction, which no unit vector has.
+/// Code of a missing direction. No unit vector is encoded with this value.
 inline constexpr uint32_t kNoDirection = 0x80008000u;
 
 /// Encodes the direction of `v`. Returns `kNoDirection` if `v` is zero or not finite.

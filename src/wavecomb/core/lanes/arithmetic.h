@@ -110,7 +110,7 @@ inline F sqr(const F& x) {
   return x * x;
 }
 
-/// Converts between floats and unsigned integers with the same bits.
+/// Reinterpret the bits of floats as unsigned integers, and vice versa.
 template <typename F>
 inline UInt<F> float_bits(const F& x) {
   if constexpr (kIsScalar<F>)
@@ -172,7 +172,7 @@ inline uint32_t mask_bits(const M& m) {
     return mask_bits(m.a1) | (mask_bits(m.a2) << M::Size1);
   } else {
 #if defined(__aarch64__)
-    // Dr.Jit has no function `bitmask_` for this CPU. All bits of a mask's lane are equal.
+    // Dr.Jit has no function `bitmask_` for this CPU. In each lane of a mask, all bits are equal.
     static_assert(M::Size == 4 && sizeof(m.m) == 16);
     constexpr uint32_t kBits[4] = {1, 2, 4, 8};
     return vaddvq_u32(vandq_u32(std::bit_cast<uint32x4_t>(m.m), vld1q_u32(kBits)));
@@ -192,7 +192,7 @@ inline uint32_t lane_bits(const Mask<F>& m) {
     return detail::mask_bits(m);
 }
 
-/// Returns the number of lanes that are set.
+/// Returns the number of lanes in which the mask is true.
 template <typename F>
 inline uint32_t count(const Mask<F>& m) {
   return static_cast<uint32_t>(std::popcount(lane_bits<F>(m)));

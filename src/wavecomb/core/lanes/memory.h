@@ -33,8 +33,8 @@ inline void store(void* p, const T& value) {
 }
 
 namespace detail {
-/// Copy of a packet in memory, from which single lanes can be read. Dr.Jit's function `entry`
-/// violates strict aliasing when it reads integer registers, and GCC 12 miscompiles it.
+/// Copy of a packet in memory, for reading single lanes. Dr.Jit's function `entry` is not used,
+/// because it violates strict aliasing when it reads integer registers, and GCC 12 miscompiles it.
 template <typename T>
 struct InMemory {
   using Value = std::conditional_t<
@@ -142,7 +142,7 @@ inline uint32_t compress_store(void* p, const T& value, const Mask<T>& active) {
   return static_cast<uint32_t>(std::popcount(bits));
 }
 
-/// Returns `table[index]` in each lane. The table has 16 words.
+/// Returns `table[index]` in each lane, for a table of 16 words.
 template <typename U>
 inline U lookup16(const uint32_t* table, const U& index) {
   if constexpr (kIsScalar<U>) {
@@ -166,7 +166,7 @@ inline U lookup16(const uint32_t* table, const U& index) {
   }
 }
 
-/// Returns `table[index]` in each lane. The table has 256 floats. With AVX-512, the function
+/// Returns `table[index]` in each lane, for a table of 256 floats. With AVX-512, the function
 /// permutes registers, which takes a third of the time of a gather instruction on Zen 4.
 template <typename F>
 inline F lookup256(const float* table, const UInt<F>& index) {

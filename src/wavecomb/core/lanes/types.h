@@ -57,7 +57,7 @@ struct Width<drjit::Packet<T, W>> {
   static constexpr size_t value = W;
   using U64 = drjit::Packet<uint64_t, W>;
 };
-// Types for half of a packet that is wider than a register.
+// Dr.Jit splits a packet that is wider than a register into two halves of the type drjit::Array.
 template <typename T, size_t W>
 struct Width<drjit::Array<T, W>> : Width<drjit::Packet<T, W>> {};
 }  // namespace detail
@@ -69,17 +69,17 @@ inline constexpr bool kIsScalar = kWidth<T> == 1;
 template <typename F>
 using UInt64 = typename detail::Width<F>::U64;
 
-/// Concept of scalars and packets. Wavecomb's functions require this concept where Dr.Jit has a
-/// function of the same name, which argument-dependent lookup also finds. Since Dr.Jit's functions
-/// have no constraint, the compiler prefers Wavecomb's functions.
+/// Concept of scalars and packets. Functions of Wavecomb that have the same name as a function of
+/// Dr.Jit require this concept. Argument-dependent lookup finds both functions, and the compiler
+/// prefers Wavecomb's function because Dr.Jit's function has no constraint.
 template <typename T>
 concept LaneValue = std::is_arithmetic_v<T> || drjit::is_array_v<T>;
 
 using drjit::select;
 
-/// Deleted, since Dr.Jit divides a packet by a scalar by multiplying with the scalar's reciprocal.
-/// The result may differ from scalar division in the last bit. Divide by a packet instead: `x /
-/// F(number)`.
+/// These operators are deleted because Dr.Jit implements division of a packet by a scalar as
+/// multiplication by the reciprocal, which may differ from scalar division in the last bit. Divide
+/// by a packet instead: `x / F(number)`.
 template <template <typename, size_t> typename P, typename T, size_t W, typename Number>
   requires std::is_floating_point_v<T> && std::is_arithmetic_v<Number>
 void operator/(const P<T, W>&, const Number&) = delete;
@@ -88,7 +88,8 @@ template <template <typename, size_t> typename P, typename T, size_t W, typename
 void operator/=(P<T, W>&, const Number&) = delete;
 
 #if defined(__AVX512F__)
-// Comparison operators for 16 unsigned lanes, since Dr.Jit 1.x compares them as signed integers.
+// Comparison operators for 16 unsigned lanes, since Dr.Jit 1.x compares unsigned lanes as signed
+// integers.
 namespace detail {
 using U16 = UInt<FloatP<16>>;
 using U16Mask = drjit::mask_t<U16>;

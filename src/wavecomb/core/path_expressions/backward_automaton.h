@@ -2,8 +2,8 @@
 /// Automaton that evaluates light path expressions along light paths, which run from the light
 /// towards the camera.
 ///
-/// The events between a vertex and the light define a function f, which maps the state of a camera
-/// path's `PathAutomaton` before these events to the set of matched expressions. A light path
+/// The events between a vertex and the light define a function f. It maps the `PathAutomaton` state
+/// that a camera path has before these events to the set of matched expressions. A light path
 /// stores the index of f. Adding an event x on the camera side changes f to f'(q) = f(next(q, x)).
 /// The functions that are reachable from the functions of all path ends are the states of the
 /// minimal automaton of the reversed expressions (J. Brzozowski, "Canonical regular expressions and
@@ -24,7 +24,8 @@ struct BackwardAutomaton {
   static constexpr uint32_t kMaxStates = PathAutomaton::kMaxStates;
 
   BackwardAutomaton() = default;
-  /// Builds the automaton. Throws `Error` if it would have more than `kMaxStates` states.
+  /// Builds the automaton. Throws `Error` if the automaton would have more than `kMaxStates`
+  /// states.
   explicit BackwardAutomaton(const PathAutomaton& forward);
 
   uint32_t forward_states = 0;

@@ -14,7 +14,8 @@ namespace {
 constexpr uint32_t kMaxNfaStates = 2000;
 /// Maximum number of states of the deterministic automaton before minimisation.
 constexpr size_t kMaxSets = 4096;
-using StateSet = std::vector<uint32_t>;  ///< set of states as their numbers in ascending order
+using StateSet = std::vector<uint32_t>;  ///< set of states, stored as state numbers in ascending
+                                         ///< order
 
 /// Nondeterministic automaton of all expressions (Thompson 1968).
 class PathNfa {

@@ -22,8 +22,8 @@ struct NamedExpression {
 };
 
 /// Scattering event of a path: reflection or transmission by a diffuse, glossy or singular (mirror)
-/// lobe, scattering in a volume, or the entry into a subsurface random walk, whose exit follows as
-/// a diffuse reflection.
+/// lobe, scattering in a volume, or the entry into a subsurface random walk. The exit of the walk
+/// is a separate event, a diffuse reflection.
 enum class PathEvent : uint32_t {
   kReflection = 0,
   kTransmission = 3,

@@ -12,8 +12,7 @@ namespace {
 constexpr uint32_t kMaxRepeats = 64;
 constexpr uint32_t kMaxNesting = 64;
 
-/// Returns the symbols that a letter of a light path expression matches, for letters on their own
-/// and letters within <>.
+/// Returns the symbols that a letter of a light path expression matches, inside or outside of <>.
 PathSymbols symbols_of_letter(char letter) {
   PathSymbols s;
   const auto events = [&](std::initializer_list<uint32_t> numbers) {
@@ -192,8 +191,7 @@ class ExpressionParser {
     ++at_;
     return c == '.' ? all_symbols() : symbols_of_letter(c);
   }
-  /// Parses one component of an event in <>: a letter of `known`, or [...] with several such
-  /// letters.
+  /// Parses one component of an event in <>: a letter from `known`, or several such letters in [].
   PathSymbols parse_position(std::string_view known) {
     if (!take('[')) return letter(known);
     const bool is_negated = take('^');

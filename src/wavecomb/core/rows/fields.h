@@ -68,7 +68,7 @@ struct WordsOf<Vec3<F>> {
   static constexpr size_t value = 3;
 };
 
-/// Convert a field of a row to the type with which words are loaded and stored, and back.
+/// Convert a field of a row to F, the type of loaded and stored words, and back.
 template <typename F, typename T>
 WAVECOMB_INLINE F to_word(const T& field) {
   if constexpr (std::is_same_v<T, F>)
@@ -167,8 +167,8 @@ inline constexpr bool kIsHead =
                    decltype(std::declval<Row<float>&>().fields())>::value;
 
 /// Loads the first fields of row `index` in the array of rows at `base`, for each active lane;
-/// other lanes get 0. `Head` is a row type with only these fields. Reads the words of these fields,
-/// and further words up to a power of two.
+/// other lanes get 0. `Head` is a row type with only these fields. The number of words that are
+/// read is rounded up to a power of two.
 template <template <typename> class Head, template <typename> class Row, typename F>
 WAVECOMB_INLINE Head<F> load_head(const void* base, const UInt<F>& index, const Mask<F>& active) {
   static_assert(sizeof(Head<float>) == 4 * kFieldWords<Head>, "WAVECOMB_FIELDS lists all fields");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Reader of records of 32-bit words. Each lane may read a different record. If all active lanes
-/// read the same record, the reader uses scalar loads, and gather instructions otherwise.
+/// Reader of records of 32-bit words. Each lane may read a different record. The reader uses scalar
+/// loads if all active lanes read the same record, and gather instructions otherwise.
 #pragma once
 
 #include <bit>

@@ -59,7 +59,7 @@ template <size_t N>
 inline constexpr size_t kRowBlock = std::bit_ceil(N);
 
 /// Loads N words at `p` into a register of B words, where N <= B, and sets the other words to 0.
-/// Reads no memory after the N words.
+/// Does not read memory beyond the N words.
 template <size_t N, size_t B>
 WAVECOMB_INLINE Vector<B> load_words(const float* p) {
   if constexpr (N == B) {
@@ -91,7 +91,7 @@ template <size_t B, size_t W>
 WAVECOMB_INLINE Vector<W> join(const Vector<B>* parts) {
   if constexpr (B == W) return parts[0];
 #if defined(__AVX__)
-  // For two vectors of four words, compilers generate needless moves from the general code.
+  // For two vectors of four words, the general code below compiles to needless moves.
   else if constexpr (B == 4 && W == 8)
     return std::bit_cast<Vector<8>>(
         _mm256_set_m128(std::bit_cast<__m128>(parts[1]), std::bit_cast<__m128>(parts[0])));
@@ -105,8 +105,7 @@ template <size_t Start, size_t W, size_t... I>
 WAVECOMB_INLINE Vector<sizeof...(I)> part(const Vector<W>& v, std::index_sequence<I...>) {
   return __builtin_shufflevector(v, v, (Start + I)...);
 }
-/// Splits `v` into parts of N words and stores part j at the address `at[j * N]`, for all j from J
-/// on.
+/// Splits `v` into parts of N words and stores part j at the address `at[j * N]`, for all j >= J.
 template <size_t N, size_t W, size_t J = 0>
 WAVECOMB_INLINE void store_parts(const Vector<W>& v, float* const* at) {
   const Vector<N> one = part<J * N, W>(v, std::make_index_sequence<N>());
@@ -213,7 +212,7 @@ WAVECOMB_INLINE std::array<F, N> load_rows(const void* base, const UInt<F>& word
 }
 
 /// Loads rows of N words from a separate array in each lane. The function `array(i)` returns the
-/// array of lane i. It is called for active lanes only.
+/// array of lane i. `array` is called only for active lanes.
 template <size_t N, typename F, typename Array>
 WAVECOMB_INLINE std::array<F, N> load_rows_of(const Array& array, const UInt<F>& word,
                                               const Mask<F>& active) {

@@ -15,7 +15,7 @@ namespace wavecomb {
 /// index below the capacity.
 class SoaBlock {
  public:
-  /// Number of values of padding past the capacity of a column.
+  /// Number of padding values after the last value of a column.
   static constexpr size_t kPad = 16;
 
   SoaBlock() = default;
@@ -25,8 +25,8 @@ class SoaBlock {
         data_(static_cast<uint32_t*>(std::aligned_alloc(64, columns * stride_ * 4))),
         bytes_(columns * stride_ * 4) {
     if (!data_) throw std::bad_alloc();
-    // Zero the memory on the thread that uses it, so that its pages are allocated on that thread's
-    // NUMA node.
+    // Zero the memory on the thread that will use it, so that the operating system allocates its
+    // pages on this thread's NUMA node.
     for (size_t i = 0; i < columns * stride_; ++i) data_.get()[i] = 0;
   }
 

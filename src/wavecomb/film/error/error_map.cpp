@@ -11,8 +11,9 @@ namespace {
 
 /// Error terms of one pixel, summed over red, green and blue. `light` is the mean of all samples.
 /// `difference` is the absolute difference between this mean and the mean of one half of the
-/// samples. `camera_paths2` and `light_splats2` are the squared differences of camera paths and of
-/// light splats alone. `known` is false until both halves have at least one full block of samples.
+/// samples, times the factor `scale` (see below). `camera_paths2` and `light_splats2` are the
+/// squares of this product for camera paths only and for light splats only. `known` is false until
+/// both halves have at least one full block of samples.
 struct PixelError {
   double light = 0, difference = 0, camera_paths2 = 0, light_splats2 = 0;
   bool known = false;
@@ -26,8 +27,8 @@ PixelError pixel_error(const Film& film, size_t pixel) {
   if (n < 2 * ErrorSums::kHalfBlock) return {};
   const double sums[3] = {p.r, p.g, p.b};
   // Let I be the mean of n samples of variance var, and A the mean of the m samples in one half.
-  // Then Var(I - A) = var (1 / m - 1 / n). Multiplied by the square of `scale`, this is var / n,
-  // the variance of I.
+  // Then Var(I - A) = var (1 / m - 1 / n). The product of this variance and the square of `scale`
+  // is var / n, the variance of I.
   const double scale = std::sqrt(static_cast<double>(in_half) / (n - in_half));
   PixelError out;
   std::array<double, 3> splats{}, light_splat_difference{};
@@ -47,8 +48,8 @@ PixelError pixel_error(const Film& film, size_t pixel) {
   return out;
 }
 
-/// Replaces each value by the sum of the 2 * kErrorWindow + 1 values around it on the same line of
-/// the image. A line has `length` values, whose distance in `values` is `step`.
+/// Replaces each value by the sum of the 2 * kErrorWindow + 1 values around it on the same row or
+/// column of the image. This line has `length` values, which are `step` elements apart in `values`.
 void sum_along(std::vector<float>& values, size_t lines, size_t line_step, size_t length,
                size_t step) {
   std::vector<float> line(length);

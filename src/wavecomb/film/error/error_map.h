@@ -12,7 +12,8 @@
 namespace wavecomb {
 
 /// Radius in pixels of the square window over which errors are averaged. In a single pixel, the
-/// means of the two halves may agree by chance. This rarely happens in all 25 pixels of the window.
+/// means of the two halves may agree by chance. Such an agreement is rare in all 25 pixels of the
+/// window.
 inline constexpr uint32_t kErrorWindow = 2;
 
 /// Error estimates of an image.
@@ -29,16 +30,16 @@ struct ErrorMap {
   /// Mean relative error of the image, sum |I - A| / sum I over all pixels and channels; infinite
   /// if no pixel has an estimate yet.
   double mean_relative = 0;
-  /// Error that each pixel would have if the mean relative error were 1 and the error were the same
-  /// in all pixels: sum I / sum sqrt(sum over rgb I).
+  /// Error of each pixel of an image whose mean relative error is 1 and whose error is the same in
+  /// all pixels: sum I / sum sqrt(sum over rgb I).
   double even_error = 0;
 };
 
 /// Computes the error estimates of a film, which must have error sums.
 ErrorMap measure_error(const Film& film);
 
-/// Noise of an image by its source: camera paths (`own`) and light splats. Each value is the sum
-/// over pixels of the squared error divided by the pixel's value.
+/// Noise of an image, split by source into camera paths (`own`) and light splats. Each value is the
+/// sum over pixels of the squared error divided by the pixel's value.
 struct NoiseParts {
   double own = 0, splats = 0;
 };

@@ -10,11 +10,11 @@ namespace wavecomb {
 /// Sum of one half of a pixel's samples, and the running variance of all its samples.
 ///
 /// The two halves are independent estimates of the pixel's value. Blocks of `kHalfBlock` samples
-/// belong to the halves alternately. Such a block of the Sobol sequence is a (t,m,s)-net and the
-/// next block fills its gaps, so that both halves are well distributed. The variance is computed by
-/// Welford's method (Technometrics 4(3), 1962, p. 419). Welford's method assumes independent
-/// samples. Since Sobol samples are not independent, the variance is only written to images and
-/// never controls sampling.
+/// belong to the halves alternately. A block of the Sobol sequence is a (t,m,s)-net, and the next
+/// block fills the gaps of this net, so that both halves are well distributed. The variance is
+/// computed by Welford's method (Technometrics 4(3), 1962, p. 419). Welford's method assumes
+/// independent samples. Since Sobol samples are not independent, the variance is only written to
+/// images and never controls sampling.
 struct ErrorSums {
   /// Number of samples in a block, a power of two. A pixel needs at least two blocks for an error
   /// estimate.
@@ -23,7 +23,7 @@ struct ErrorSums {
   double half[3] = {0, 0, 0};  ///< sum of the samples in blocks with even numbers
   double m2[3] = {0, 0, 0};    ///< Welford's sum of squared differences from the mean
 
-  /// Returns the number of a pixel's first `n` samples that belong to `half`.
+  /// Returns how many of a pixel's first `n` samples belong to `half`.
   static constexpr uint32_t half_count(uint32_t n) {
     const uint32_t rest = n % (2 * kHalfBlock);
     return n / (2 * kHalfBlock) * kHalfBlock + (rest < kHalfBlock ? rest : kHalfBlock);

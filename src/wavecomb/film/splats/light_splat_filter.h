@@ -12,9 +12,9 @@
 
 namespace wavecomb {
 
-/// Wrap-around of a panoramic image. Points repeat after a full turn in x. A point beyond a pole
-/// appears mirrored in y and half a turn away in x. If `pixels` is 0, the image does not wrap
-/// around.
+/// Wrap-around of a panoramic image. Points repeat after a full turn in x. A point beyond a pole is
+/// mirrored in y at the pole and moved by half a turn in x. If `pixels` is 0, the image does not
+/// wrap around.
 struct ImageWrap {
   float pixels = 0;            ///< width of a full turn in pixels
   float north = 0, south = 0;  ///< y coordinates of the poles in pixels
@@ -30,9 +30,9 @@ struct LightSplatPoint {
 /// Distributes light splats over pixels with the pixel filter. The splat's weight in a pixel is the
 /// density of the filter at its offset from the pixel centre, which is also the density with which
 /// filter importance sampling chooses the positions of the pixel's camera rays. In mode
-/// `one_pixel`, a splat has the sum of its weights in one pixel, which is chosen with a probability
-/// proportional to its weight, and no weight elsewhere. The choice does not depend on the rendered
-/// region.
+/// `one_pixel`, a splat contributes to a single pixel with the sum of its weights in all pixels.
+/// The pixel is chosen with a probability proportional to the splat's weight in the pixel. The
+/// choice does not depend on the rendered region.
 class LightSplatFilter {
  public:
   /// Creates a filter for light splats. `rendered` is the rectangle of pixels that receive light
@@ -96,7 +96,7 @@ class LightSplatFilter {
       spread_at(film, {x, at.y, at.bits}, add);
   }
 
-  /// Pixel column or row, and the sum of the weights of all columns or rows.
+  /// Selected pixel column or row, and the sum of the weights of all columns or rows.
   struct Chosen {
     int index;
     float weight;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Light splats, which are contributions of light paths and may belong to any pixel of the image.
+/// Light splats, which are contributions of light paths to arbitrary pixels of the image.
 ///
 /// The sums of light splats are integers, so that they do not depend on the order of additions and
 /// any wave can add splats to any pixel at any time. Each wave collects its light splats in a
@@ -127,9 +127,9 @@ class LightSplatLayer {
   using Sum = LightSplatSums::Sum;
 
   LightSplatLayer() = default;
-  /// Allocates the sums. `paths` is the number of light path indices, each of which represents
-  /// `scale` light paths per sample. If `with_error` is true, the splats of one half of the samples
-  /// are also summed separately, for error estimates.
+  /// Allocates the sums. `paths` is the number of light path indices. Each index stands for `scale`
+  /// light paths per sample. If `with_error` is true, the splats of one half of the samples are
+  /// also summed separately, for error estimates.
   LightSplatLayer(size_t pixels, FixedPoint unit, size_t paths = 0, double scale = 1,
                   bool with_error = false)
       : sums_(pixels, unit),
@@ -152,10 +152,9 @@ class LightSplatLayer {
     add(list);
     LightSplatSums::plus(paths_[0], paths);
   }
-  /// Returns whether the splats of a light path with the sample index `sample` also belong to the
-  /// half of the samples for error estimates. This is true for every second sample. The two halves
-  /// are independent, since light paths of different sample indices use separate sequences
-  /// (light_paths/light_path.h).
+  /// Returns whether splats of sample number `sample` are also added to the separate sums for error
+  /// estimates, which contain every second sample. The two halves are independent, since light
+  /// paths of different sample indices use separate sequences (light_paths/light_path.h).
   static bool is_in_half(uint32_t sample) { return sample % 2 == 0; }
   /// Records that light paths with the index `path` were traced for the samples `first` to `first +
   /// count - 1`.
@@ -164,7 +163,7 @@ class LightSplatLayer {
     LightSplatSums::plus(paths_[0], count);
     if (has_error()) LightSplatSums::plus(paths_[1], (first + count + 1) / 2 - (first + 1) / 2);
   }
-  /// Returns the number of traced samples of each light path index.
+  /// Returns the number of samples that were traced for each light path index.
   const std::vector<uint32_t>& samples() const { return samples_; }
   /// Returns the factor by which the current sums are multiplied to get means.
   LightSplatScale scale() const { return scale_of(paths_[0]); }
@@ -203,7 +202,8 @@ class LightSplatLayer {
   }
 
   LightSplatSums sums_, half_;
-  /// Total number of traced light paths, and number of light paths in the half for error estimates.
+  /// Number of all traced light paths, and number of light paths in the half of the samples that is
+  /// used for error estimates.
   std::vector<int64_t> paths_ = std::vector<int64_t>(2);
   std::vector<uint32_t> samples_;
   double scale_ = 1;

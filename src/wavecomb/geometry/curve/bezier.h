@@ -78,8 +78,8 @@ struct Bezier {
     c[1] = c[0] + (c[3] - c[0]) * (1.0 / 3);
     c[2] = c[0] + (c[3] - c[0]) * (2.0 / 3);
   }
-  /// Replaces the curve `c` by its first or second half (De Casteljau's algorithm). The result has
-  /// the same bits as the result of split().
+  /// Replaces the curve `c` by its first or second half (De Casteljau's algorithm). The result is
+  /// bit-identical to the same half from split().
   template <typename T, typename S = double>
   static void keep_half(T* c, bool second, S half = 0.5) {
     const T a = (c[0] + c[1]) * half, m = (c[1] + c[2]) * half, b = (c[2] + c[3]) * half;

@@ -18,8 +18,8 @@ namespace {
 using NodeLanes = FloatP<CurveBvhNodes::kMaxSubSegments>;
 
 constexpr float kCells = 65535.f;
-/// Largest cell coordinate that positions are mapped to. It is below `kCells`, so that coordinates
-/// stay in range after rounding.
+/// Largest cell coordinate to which a position is mapped. The value is below `kCells`, so that
+/// coordinates stay in range after rounding.
 constexpr float kLargestCell = 65000.f;
 /// Segments are split if their length exceeds this multiple of their radius.
 constexpr float kSlender = 32.f;
@@ -80,8 +80,9 @@ uint32_t halvings(const Mesh& mesh, uint32_t segment, const SegmentCapsule& whol
   return mesh.indices.size() <= kManySegments ? 2 : 1;
 }
 
-/// Sub-segment in a list that is sorted by position: twice the midpoint of its axis, and its
-/// number. A whole segment is represented by its first sub-segment.
+/// Entry for a sub-segment in a list that is sorted by position: twice the midpoint of the
+/// sub-segment's axis, and the sub-segment's number. The entry of a whole segment has the number of
+/// its first sub-segment.
 struct SubSegmentEntry {
   std::array<float, 3> middle;
   uint32_t number;
@@ -105,7 +106,8 @@ void for_range(size_t first, size_t end, size_t grain, const CurveBvhNodes::RunB
 }
 
 /// Partitions entries recursively by their midpoints along the longest axis, until each part has at
-/// most `full` entries. All parts except the last have exactly `full` entries.
+/// most `full` entries. All parts have exactly `full` entries, except the last, which may have
+/// fewer.
 void partition_entries(std::span<SubSegmentEntry> entries, size_t full,
                        const CurveBvhNodes::RunBoth& run_both) {
   constexpr size_t kMany = 1u << 15;
@@ -161,7 +163,7 @@ float l1_norm(const float* v) {
 }  // namespace
 
 CurveBvhNodes::CurveBvhNodes(const Mesh& mesh, const RunBoth& run_both) : mesh_(mesh) {
-  // Create the sub-segments of one group of segments after another, to limit the memory use.
+  // Process one group of segments at a time, to limit the memory for sub-segments.
   constexpr size_t kGroup = 1u << 16;
   const std::vector<SubSegmentEntry> segments = segments_of(mesh, kGroup, run_both);
   const size_t groups = (segments.size() + kGroup - 1) / kGroup;

@@ -2,12 +2,12 @@
 /// BVH nodes of up to eight curve sub-segments.
 ///
 /// The bounding boxes of hair segments are a hundred times longer than a strand is wide, so a ray
-/// misses nearly all segments whose boxes it hits, and testing each of these segments causes a
-/// cache miss. Embree therefore builds its BVH over nodes of nearby sub-segments: whole segments,
-/// or parts of slender segments. A node stores the capsules of its sub-segments, quantised to 16
-/// bits, and tests a ray against all capsules at once with SIMD instructions. The function
-/// `intersect_curve` then tests the sub-segments that the ray may hit. The test of the capsules is
-/// conservative, so that it never misses a hit.
+/// that hits boxes of segments misses nearly all of these segments, and each test of a segment
+/// causes a cache miss. Embree therefore builds its BVH over nodes of nearby sub-segments: whole
+/// segments, or parts of slender segments. A node stores the capsules of its sub-segments,
+/// quantised to 16 bits, and tests a ray against all capsules at once with SIMD instructions. The
+/// function `intersect_curve` then tests the sub-segments that the ray may hit. The test of the
+/// capsules is conservative, so that it never misses a hit.
 #pragma once
 
 #include <array>
@@ -28,7 +28,7 @@ class CurveBvhNodes {
   /// Returns whether curve BVH nodes can be built for a mesh.
   static bool supports(const Mesh& mesh) { return mesh.is_strands() && !mesh.deforms(); }
 
-  /// Function that runs two given tasks, possibly in parallel.
+  /// Type of function that runs two given tasks, possibly in parallel.
   using Task = std::function<void()>;
   using RunBoth = std::function<void(const Task&, const Task&)>;
 

@@ -53,8 +53,8 @@ class SegmentTest {
     // Search for entry points behind the ray origin as well, since the ray may start inside the
     // tube.
     if (mesh_.is_ribbon() || outside) z_near_ = 0;
-    // A ray that starts inside the tube may leave it in another sub-segment, so search the whole
-    // segment.
+    // A ray that starts inside the tube may leave the tube in another sub-segment, so search the
+    // whole segment.
     if (mesh_.is_ribbon() || outside) return search_node(node);
     if (passes_by(curve_, *std::max_element(curve_.r, curve_.r + 4))) return;
     const int halvings = depth();
@@ -85,8 +85,8 @@ class SegmentTest {
     return halvings;
   }
 
-  /// Returns whether the ray misses the convex hull of a sub-segment because all of the hull is on
-  /// one side of the ray, perpendicular to the chord.
+  /// Returns whether the whole convex hull of a sub-segment lies on one side of the ray in the
+  /// direction perpendicular to the chord, so that the ray misses the hull.
   static bool passes_by(const Bezier& sub_segment, double r) {
     const double x = sub_segment.p[3].x - sub_segment.p[0].x,
                  y = sub_segment.p[3].y - sub_segment.p[0].y;
@@ -138,7 +138,7 @@ class SegmentTest {
     search(b, middle, u1, halvings - 1);
   }
 
-  /// Splits a sub-segment of a tube into nearly straight sub-segments and tests all of these at
+  /// Splits a sub-segment of a tube into nearly straight sub-segments and tests all of them at
   /// once.
   void search_sub_segments(const Bezier& sub_segment, double r, double u0, double u1,
                            int halvings) {
@@ -172,7 +172,7 @@ class SegmentTest {
       return side * d.z > 0 ? kFar : -kFar;  // the ray stays inside the cone
     }
     const double q = -side * d.z * std::sqrt(discriminant / k);
-    // Choose the formula for the root that has no cancellation.
+    // Choose the formula that computes the root without cancellation.
     double w = 0;
     if (q * b > 0)
       w = (b * b - d.z * d.z * h) / (k * (q + b));
@@ -324,7 +324,7 @@ class SegmentTest {
   static constexpr int kSteps = 40, kRibbonSteps = 100;
   /// Step size in u at which the search for an extremum ends.
   static constexpr double kNear = 1e-9;
-  static constexpr double kFar = 2;  ///< step in u that leads out of the segment from any u
+  static constexpr double kFar = 2;  ///< step in u that leaves the segment from any u
   /// Sine of the angle by which the spherical ends of adjoining segments overlap, to prevent gaps.
   static constexpr double kSeam = 1e-3;
 
@@ -341,7 +341,7 @@ class SegmentTest {
   double bulge_ = 0;            ///< deviation of the final sub-segments from straight lines
   double z_near_ = -kInfinity;  ///< smallest z of entry points to search for
   int side_ = -1;               ///< -1 to search for entry points, 1 for exit points
-  /// Whether the ray may start inside the tube, since it enters behind its origin or from the
+  /// Whether the ray may start inside the tube: it entered behind its origin or through the
   /// adjoining segment.
   bool may_be_inside_ = false;
 };

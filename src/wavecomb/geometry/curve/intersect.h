@@ -48,7 +48,7 @@ struct SubSegment {
   uint32_t node = 1;
 };
 
-/// Type of query: the first hit, all hits, or whether there is any hit. Queries for any hit do not
+/// Type of query: the first hit, all hits, or whether there is any hit. Queries of type kAny do not
 /// compute u and v.
 enum class CurveQuery { kFirst, kAll, kAny };
 
@@ -60,8 +60,8 @@ Bounds curve_bounds(const Mesh& mesh, uint32_t prim, uint32_t step = 0);
 /// < t <= tfar, in units of the length of the ray direction. Rays hit the outside and the inside of
 /// tubes, or only the outside if `outside` is true. They do not hit the parts of spherical ends
 /// that are inside the adjoining segment. `time` is the shutter time in [0, 1]. Returns all hits on
-/// the given sub-segment, and possibly other hits on its segment. The hits have the same bits as in
-/// a query for the whole segment.
+/// the given sub-segment, and possibly further hits on the same segment. Each hit is bit-identical
+/// to the hit that a query for the whole segment returns.
 CurveHits intersect_curve(const Mesh& mesh, const SubSegment& sub_segment, const CurveRay& ray,
                           float tfar, CurveQuery query, float time = 0, bool outside = false);
 

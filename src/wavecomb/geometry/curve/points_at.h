@@ -11,7 +11,7 @@
 
 namespace wavecomb {
 
-/// Points and normals of a mesh at a given time. The values have the same bits as the values of
+/// Points and normals of a mesh at a given time. The values are bit-identical to the values of
 /// `detail::MovingRows`, which shading uses.
 class PointsAt {
  public:

@@ -24,7 +24,7 @@ struct CurveRay {
     }
   }
 
-  /// Returns whether this ray has the given origin and direction, bit by bit.
+  /// Returns whether origin and direction of this ray are bit-identical to the given vectors.
   bool is(const float (&from)[3], const float (&along)[3]) const {
     return std::memcmp(origin, from, sizeof(origin)) == 0 &&
            std::memcmp(dir, along, sizeof(dir)) == 0;

@@ -62,8 +62,8 @@ struct CurveWeights {
   T at(const std::array<T, 4>& x) const {
     return x[0] * value[0] + x[1] * value[1] + x[2] * value[2] + x[3] * value[3];
   }
-  /// Returns the derivative at u. It is computed from differences of control points, which is
-  /// precise even if control points are close together.
+  /// Returns the derivative at u. The derivative is computed from differences of control points, so
+  /// that it is precise even if control points are close together.
   template <typename T>
   T along(const std::array<T, 4>& x) const {
     return (x[1] - x[0]) * slope[0] + (x[2] - x[1]) * slope[1] + (x[3] - x[2]) * slope[2];
@@ -134,7 +134,7 @@ inline Vec3<F> sphere_normal(const F& u, const F& v) {
 
 /// Bit masks for the values in `Mesh::indices` of a mesh of curves: the index of a segment's first
 /// control point, and flags that state whether the curve continues before and after the segment. If
-/// it does, the adjacent control point gives the direction in which it continues.
+/// the curve continues, the adjacent control point gives its direction there.
 inline constexpr uint32_t kCurveContinuesBefore = 0x80000000u, kCurveContinuesAfter = 0x40000000u;
 inline constexpr uint32_t kCurveFirstPoint = 0x3fffffffu;
 

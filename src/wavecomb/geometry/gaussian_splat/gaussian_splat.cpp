@@ -63,7 +63,7 @@ std::vector<GaussianSplatRow> make_gaussian_splat_rows(std::span<const float> sc
     V axis[3];
     axes_of(&orientations[4 * i], name, axis);
     row.opacity = opacities[i];
-    // Make a row for invisible Gaussian splats as well, so that row indices equal splat indices.
+    // Also make rows for invisible Gaussian splats, so that row indices equal splat indices.
     const double visible = 2 * std::log(std::max(opacities[i] / kMinAlpha, 1.0));
     const double cut = std::min(kMaxDeviations * kMaxDeviations, visible);
     row.cut = opacities[i] < static_cast<float>(kMinAlpha) ? -1.f : static_cast<float>(cut);

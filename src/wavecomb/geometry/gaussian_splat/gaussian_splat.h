@@ -60,7 +60,8 @@ struct GaussianSplatFrame {
 };
 
 /// Returns the axes of the hit coordinates for `e`, the unit ray direction in units of standard
-/// deviations. The axes are discontinuous at one direction, which is not a coordinate axis.
+/// deviations. As a function of `e`, the axes are discontinuous at a single direction, which is not
+/// a coordinate axis.
 template <typename F>
 inline GaussianSplatFrame<F> gaussian_splat_frame(const Vec3<F>& e) {
   const Vec3<F> pole(F(0.36f), F(0.48f), F(0.8f));

@@ -13,7 +13,7 @@ namespace wavecomb::detail {
 template <typename F>
 struct CurvedPoint {
   Vec3<F> p, n, dpdu;  ///< n: unit outward normal
-  /// Upper bound of the magnitudes of the terms that add up to `p`. The rounding error of `p` is
+  /// Upper bound of the magnitudes of the summands of `p`. The rounding error of `p` is
   /// proportional to this bound.
   F size;
   F du, dv;  ///< lengths of dp/du and dp/dv
@@ -113,8 +113,8 @@ struct ControlPoints {
 };
 
 /// Moves control points, ribbon normals and instance transforms to the time of the hits. Returns an
-/// upper bound of the terms that add up to a world position, to which its rounding error is
-/// proportional.
+/// upper bound of the magnitudes of the summands of a world position. The rounding error of the
+/// position is proportional to this bound.
 template <typename F>
 [[gnu::noinline, gnu::cold]] F move_segment(const SceneView& scene, const MeshHit<F>& hit,
                                             const ControlPoints<F>& from, const Mask<F>& active,

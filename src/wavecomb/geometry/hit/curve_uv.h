@@ -6,8 +6,8 @@
 
 namespace wavecomb::detail {
 
-/// Texture coordinates on curves and points. In lanes with `authored` coordinates, `d` is the
-/// difference of the coordinates at the two ends of the curve segment.
+/// Texture coordinates on curves and points. In lanes where the coordinates are `authored`, `d` is
+/// the difference between the coordinates at the two ends of the curve segment.
 template <typename F>
 struct CurveUv {
   Vec2<F> uv, d;

@@ -15,8 +15,8 @@
 
 namespace wavecomb {
 
-/// Returns the shutter time of a path in [0, 1), which all rays of the path share. The time depends
-/// only on the sample key.
+/// Returns the shutter time of a path, which is in [0, 1) and the same for all rays of the path.
+/// The time depends only on the sample key.
 template <typename F>
 inline F path_time(SamplerKind sampler, const SampleKey<F>& key) {
   return sample_4d<F>(sampler, key, kTimeSet).x;
@@ -51,7 +51,7 @@ struct MatrixPair {
     return {{{at(0), at(1), at(2)}, {at(4), at(5), at(6)}, {at(8), at(9), at(10)}},
             {at(3), at(7), at(11)}};
   }
-  /// Returns the larger magnitude of matrix entry k in the two transforms.
+  /// Returns the larger of the magnitudes of matrix entry k in the two transforms.
   F reach(size_t k) const { return max(abs(a[k]), abs(b[k])); }
 };
 
@@ -77,7 +77,8 @@ class MovingRows {
   }
 
   struct Value {
-    /// Interpolated value, and for each component its larger magnitude at the two motion steps.
+    /// Interpolated value, and for each component the larger of its magnitudes at the two motion
+    /// steps.
     Vec3<F> v, reach;
   };
   Value operator()(const UInt<F>& index, const Mask<F>& active) const {
@@ -89,7 +90,7 @@ class MovingRows {
     };
     const Vec3<F> a = rows(before_), b = rows(after_);
     const auto larger = [](const F& x, const F& y) { return max(abs(x), abs(y)); };
-    // Do not use fma, so that the result is bit-identical to that of curve traversal in every
+    // Do not use fma, so that the result is bit-identical to the result of curve traversal in every
     // build.
     return {Vec3<F>(b - a) * part_ + a, {larger(a.x, b.x), larger(a.y, b.y), larger(a.z, b.z)}};
   }
@@ -107,7 +108,7 @@ struct MovedInstance {
   Mask<F> moves;
   MatrixLanes<F> to_world;  ///< transforms, valid in lanes whose instances move
   F side;                   ///< sign of the determinant of to_world
-  F size;                   ///< upper bound of the terms that add up to a world position
+  F size;                   ///< upper bound of the magnitudes of the summands of a world position
 };
 
 /// Returns the transforms of moving instances. `maps` holds the transforms of instances that do not

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Adjustment of shading normals to the viewing direction.
 ///
-/// A shading normal n that differs from the geometric normal g is visible from directions from
-/// which a real surface could not be: it may point away from the viewer, or its mirror direction
-/// may point below the surface, from which no light arrives. In the following, w points to the
-/// viewer, and g and n are on the viewer's side.
+/// A shading normal n that differs from the geometric normal g can be inconsistent with the viewing
+/// direction: n may point away from the viewer, or the mirror direction about n may point below the
+/// surface, where no light comes from. In the following, w points to the viewer, and g and n are on
+/// the viewer's side.
 #pragma once
 
 #include "wavecomb/core/vec.h"
@@ -19,8 +19,8 @@ WAVECOMB_INLINE F incident_side(const Vec3<F>& dir, const Vec3<F>& ng) {
 }
 }  // namespace detail
 
-/// Returns `n`, for a ray along `dir`, bent towards the viewer until w . n >= 0.001 if it points
-/// away from the viewer.
+/// Returns `n` or, if w . n < 0.001, `n` bent towards the viewer until w . n >= 0.001. `dir` = -w
+/// is the direction of the ray.
 template <typename F>
 WAVECOMB_INLINE Vec3<F> facing_normal(const Vec3<F>& dir, const Vec3<F>& ng, const Vec3<F>& n) {
   constexpr float kEdge = 1e-3f;
@@ -31,11 +31,11 @@ WAVECOMB_INLINE Vec3<F> facing_normal(const Vec3<F>& dir, const Vec3<F>& ng, con
   return select<F>(away, normalize(fma(dir, F(-towards * (kEdge - view_cosine)), n)), n);
 }
 
-/// Returns `n`, which faces the viewer, bent until its mirror direction r = 2 (w . n) n - w leaves
-/// the surface. If r . g is below t = min(0.9 w . g, 0.01), r is raised to r . g = t, and n becomes
-/// the half vector of w and the raised r (A. Keller et al., "The Iray Light Transport Simulation
-/// and Rendering System", 2017, appendix A.3). The adjustment avoids black rims on glossy surfaces
-/// with a normal map.
+/// Bends `n`, which faces the viewer, until the mirror direction r = 2 (w . n) n - w leaves the
+/// surface, and returns the result. If r . g is below t = min(0.9 w . g, 0.01), r is raised to r .
+/// g = t, and n becomes the half vector of w and the raised r (A. Keller et al., "The Iray Light
+/// Transport Simulation and Rendering System", 2017, appendix A.3). The adjustment avoids black
+/// rims on glossy surfaces with a normal map.
 template <typename F>
 WAVECOMB_INLINE Vec3<F> reflecting_normal(const Vec3<F>& dir, const Vec3<F>& ng, const Vec3<F>& n) {
   constexpr float kHeight = 0.01f, kMinCosine = 1e-4f;

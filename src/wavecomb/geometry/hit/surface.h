@@ -26,10 +26,10 @@ struct TrianglePoint {
   F safe_area2;
 };
 
-/// Returns an upper bound of the rounding error of a hit point. It is proportional to the
-/// magnitudes of the terms of the interpolated point and, with a smaller weight, of the triangle's
-/// corners, from which traversal subtracts the ray's origin. All axes share one bound, since the
-/// errors of the cross products in traversal depend on several axes.
+/// Returns an upper bound of the rounding error of a hit point. The bound is a weighted sum of the
+/// magnitudes of two kinds of terms: the summands of the interpolated point and, with a smaller
+/// weight, the triangle's corners, from which traversal subtracts the ray's origin. All axes share
+/// one bound, since the errors of the cross products in traversal depend on several axes.
 template <typename F>
 WAVECOMB_INLINE F rounding_offset(const InstanceMaps<F>& maps, const TrianglePoint<F>& at) {
   const Vec3<F> q0 = abs3(at.p0), q1 = abs3(at.p1), q2 = abs3(at.p2);
@@ -40,7 +40,7 @@ WAVECOMB_INLINE F rounding_offset(const InstanceMaps<F>& maps, const TrianglePoi
          0x1p-20f;
 }
 
-/// Selects the lanes with interpolated normals, and whether to compute their terminator vectors.
+/// Lanes with interpolated normals, and whether to compute the terminator vectors of these lanes.
 template <typename F>
 struct SmoothLanes {
   const Mask<F>& smooth;
@@ -106,7 +106,7 @@ WAVECOMB_INLINE void set_triangle_uv(const SceneView& scene, const MeshHit<F>& h
   s.uv_per_length = sqrt(F(abs(det) / at.safe_area2));
   const Mask<F> mirrored = det < 0.f;
   s.handedness = select(mirrored, F(-maps.side), maps.side);
-  // dp/du = (d2.v e1 - d1.v e2) / det. Only the direction of dp/du is used.
+  // dp/du = (d2.v e1 - d1.v e2) / det. The direction of dp/du is used, but not its length.
   const Vec3<F> across = at.e1 * d2.y - at.e2 * d1.y;
   Vec3<F> tangent = select<F>(mirrored, -across, across);
   // Pass a copy of the vertex indices, so that the original values can stay in registers.
@@ -122,10 +122,10 @@ WAVECOMB_INLINE void set_triangle_uv(const SceneView& scene, const MeshHit<F>& h
 /// the terminator vector is computed. `kWithCurves` may be false for scenes without curves, and
 /// `kWithMotion` for scenes without motion.
 ///
-/// The member `offset` is an upper bound of the distance between `p` and the true surface. Rounding
-/// errors of interpolation, transform and traversal cause this distance (Pharr, Jakob, Humphreys,
-/// "Physically Based Rendering", section 6.8). The terminator vector follows Hanika, "Hacking the
-/// Shadow Terminator", Ray Tracing Gems II.
+/// The member `offset` is an upper bound of the distance between `p` and the true surface. This
+/// distance is due to rounding errors of interpolation, transformation and traversal (Pharr, Jakob,
+/// Humphreys, "Physically Based Rendering", section 6.8). The terminator vector follows Hanika,
+/// "Hacking the Shadow Terminator", Ray Tracing Gems II.
 template <typename F, bool kWithCurves = true, bool kWithMotion = true>
 WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F>& hit,
                                          const Vec3<F>& dir, bool with_uv, bool with_terminator,

@@ -33,10 +33,11 @@ struct Surface {
   F handedness;
   Vec2<F> uv;
   F uv_per_length;  ///< sqrt(uv area / world-space area) of the triangle
-  F offset;         ///< bound of the position error along ng
+  F offset;         ///< upper bound of the error of p along ng
   /// Vector along ng from p to the smooth surface that the vertex normals imply (see surface.h).
   Vec3<F> terminator;
-  Vec3<F> unadjusted;  ///< ns before facing_normal() adjusted it to the viewing direction
+  Vec3<F> unadjusted;  ///< shading normal before facing_normal() adjusts it to the viewing
+                       ///< direction
 };
 
 namespace detail {
@@ -109,7 +110,7 @@ class MeshReader {
         active);
   }
 
-  /// Mesh of all active lanes, if they have the same mesh; else null.
+  /// Mesh of the active lanes if it is the same in all of them; else null.
   const MeshRecord* shared_ = nullptr;
   const MeshRecord* records_[kWidth<F>];
 };

@@ -9,8 +9,8 @@
 
 namespace wavecomb {
 
-/// Texture coordinates over a triangle: the coordinates of vertex 0, and the differences of the
-/// other two vertices from it.
+/// Texture coordinates over a triangle: the coordinates of vertex 0, and the differences between
+/// these and the coordinates of the other two vertices.
 template <typename F>
 struct UvTriangle {
   Vec2<F> t0, d1, d2;
@@ -25,8 +25,8 @@ struct UvTriangle {
 
 namespace detail {
 
-/// Returns the texture coordinates of triangle `prim`, whose vertices are `corners`; barycentrics
-/// if the mesh has no texture coordinates.
+/// Returns the texture coordinates of triangle `prim`, whose vertices are `corners`, or the
+/// barycentrics if the mesh has no texture coordinates.
 template <typename F>
 WAVECOMB_INLINE UvTriangle<F> uv_triangle(const MeshReader<F>& mesh,
                                           const std::array<UInt<F>, 3>& corners,
@@ -50,8 +50,8 @@ WAVECOMB_INLINE UvTriangle<F> uv_triangle(const MeshReader<F>& mesh,
 
 }  // namespace detail
 
-/// Returns the texture coordinates of a hit at (u, v) of primitive `prim`. They equal the texture
-/// coordinates that setup_surface() computes.
+/// Returns the texture coordinates of a hit at (u, v) of primitive `prim`. The result equals the
+/// texture coordinates that setup_surface() computes.
 template <typename F>
 inline Vec2<F> hit_uv(const MeshRecord* meshes, const UInt<F>& mesh, const UInt<F>& prim,
                       const F& u, const F& v, const Mask<F>& active) {

@@ -56,7 +56,7 @@ void make_attribute_records(SceneGeometry& geometry) {
   const std::vector<Mesh>& meshes = geometry.meshes;
   if (std::ranges::all_of(meshes, [](const Mesh& mesh) { return mesh.attributes.empty(); })) return;
   const AttributeRecord end{0, 0, kNoAttribute, AttributeRate::kConstant, 0, 0};
-  geometry.attribute_records.push_back(end);  // empty list, for meshes without attributes
+  geometry.attribute_records.push_back(end);  // the empty list of meshes without attributes
   geometry.mesh_attributes.resize(meshes.size());
   for (size_t m = 0; m < meshes.size(); ++m) {
     if (meshes[m].attributes.empty()) continue;

@@ -57,12 +57,12 @@ static_assert(sizeof(GaussianSplatRow) == 64);
 
 /// Primitives of one type: an indexed triangle mesh, curves or points (geometry/curve/segment.h),
 /// or Gaussian splats (geometry/gaussian_splat/gaussian_splat.h). The material of splats must use
-/// the shading program "emissive". The caller owns the arrays, which are not copied; `owner` keeps
-/// them alive for as long as a Scene uses them.
+/// the shading program "emissive". The arrays are not copied. They belong to the caller, and
+/// `owner` keeps them alive as long as a Scene uses them.
 struct Mesh {
   std::string name;
   Primitive primitive = Primitive::kTriangle;
-  /// 3 floats per vertex, Bezier control point or point, for one motion step after another.
+  /// 3 floats per vertex, Bezier control point or point, for each motion step in turn.
   std::span<const float> positions;
   /// Vertex indices: 3 per triangle, counter-clockwise as seen from outside. For curves, 1 value
   /// per segment with the index of its first control point (kCurveFirstPoint). Empty for points.
@@ -70,8 +70,8 @@ struct Mesh {
   /// Radius of each control point or point, or of the bounding sphere of each splat; empty for
   /// triangles.
   std::span<const float> radii;
-  /// 3 floats per vertex or corner, or per control point of ribbons, for one motion step after
-  /// another; empty for flat shading.
+  /// 3 floats per vertex or corner, or per control point of ribbons, for each motion step in turn;
+  /// empty for flat shading.
   std::span<const float> normals;
   Attribute normals_at = Attribute::kNone;
   std::span<const float> uvs;  ///< 2 floats per vertex or corner; if empty, uv are the barycentrics
@@ -91,7 +91,8 @@ struct Mesh {
   uint32_t harmonics_degree = 0;     ///< 0 to 3
   /// Attributes of the mesh. Their values do not change between motion steps.
   std::vector<MeshAttribute> attributes;
-  /// Number of shapes at equally spaced shutter times; 1 if the mesh does not deform.
+  /// Number of motion steps, which are shapes of the mesh at equally spaced shutter times; 1 if the
+  /// mesh does not deform.
   uint32_t steps = 1;
   std::shared_ptr<const void> owner;
 

@@ -71,8 +71,8 @@ struct MotionView {
   const MatrixStep* steps = nullptr;
 };
 
-/// Interpolates between the transforms a and b with weight `part` of b, for each matrix entry, as
-/// Embree does.
+/// Interpolates the matrix entries of the transforms a and b linearly, where `part` is the weight
+/// of b, as Embree does.
 inline Affine between(const Affine& a, const Affine& b, float part) {
   const auto mix = [&](const Vec3<float>& p, const Vec3<float>& q) {
     return p * (1.f - part) + q * part;
@@ -90,8 +90,8 @@ inline Affine at_step(std::span<const Affine> steps, uint32_t k, uint32_t n) {
                  static_cast<float>(offset % n) / static_cast<float>(n));
 }
 
-/// Returns the number of time segments for the product of two motions with `a` and `b` segments. It
-/// is a common multiple of `a` and `b`, up to a limit.
+/// Returns the number of time segments for the product of two moving transforms with `a` and `b`
+/// time segments. The result is a common multiple of `a` and `b`, up to a limit.
 uint32_t common_segments(uint32_t a, uint32_t b);
 
 }  // namespace wavecomb

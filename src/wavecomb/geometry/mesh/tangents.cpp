@@ -16,8 +16,8 @@ using V = Vec3<float>;
 /// `kBatch` triangles are processed at a time, to limit the memory for their tangents. Each
 /// parallel task processes `kChunk` triangles of a batch.
 constexpr size_t kBatch = 65536, kChunk = 1024;
-/// A mean tangent whose length is below this fraction of the sum of its weights has no reliable
-/// direction.
+/// If the length of a weighted sum of tangents is below this fraction of the sum of the weights,
+/// its direction is not reliable.
 constexpr float kMinMean = 1e-2f;
 
 V unit(const V& v) {
@@ -41,12 +41,13 @@ class Corners {
   V normal(size_t corner, uint32_t step) const {
     return row(mesh_.normals, value_index(mesh_.normals_at, corner), step);
   }
-  /// Returns twice the signed area of a triangle in texture space, negative if it is mirrored.
+  /// Returns twice the signed area of a triangle in texture space, which is negative if the texture
+  /// is mirrored.
   float uv_area(size_t triangle) const {
     const auto a = uv(3 * triangle), b = uv(3 * triangle + 1), c = uv(3 * triangle + 2);
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
   }
-  /// Returns the normalised dp/du of a triangle, or zero if it has no direction.
+  /// Returns the normalised dp/du of a triangle, or zero if dp/du has no direction.
   V tangent(size_t triangle, uint32_t step) const {
     const auto a = uv(3 * triangle), b = uv(3 * triangle + 1), c = uv(3 * triangle + 2);
     const V p = position(3 * triangle, step);
@@ -160,7 +161,7 @@ std::vector<uint8_t> meshes_with_tangents(const SceneGeometry& geometry,
           return materials.wants_tangents[bound_material] != 0;
         });
   };
-  // Visit consecutive instances of the same group and material only once.
+  // Skip instances with the same group and material as the previous instance.
   visit(0, geometry.instance_records[0].material);
   uint32_t group = kNone, material = kNone;
   for (const Instance& i : geometry.instances) {

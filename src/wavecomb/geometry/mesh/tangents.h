@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Mesh tangents along u that vary smoothly over triangles, as normals do.
 ///
-/// Tangents follow MikkTSpace, for which normal maps are baked (M. Mikkelsen, "Simulation of
-/// Wrinkled Surfaces Revisited", 2008). Corners of a vertex with the same texture coordinates,
-/// normal and texture orientation share one tangent. The shared tangent is the mean of the tangents
-/// of the corners' triangles, each projected to the plane of the normal and weighted by the
-/// triangle's angle at the corner. Tangents are therefore split at texture seams, where the texture
-/// is mirrored, and at hard edges.
+/// Tangents follow MikkTSpace, the convention for which normal maps are baked (M. Mikkelsen,
+/// "Simulation of Wrinkled Surfaces Revisited", 2008). Corners of a vertex with the same texture
+/// coordinates, normal and texture orientation share one tangent. The shared tangent is the mean of
+/// the tangents of the corners' triangles, each projected to the plane of the normal and weighted
+/// by the triangle's angle at the corner. Tangents are therefore split at texture seams, where the
+/// texture is mirrored, and at hard edges.
 #pragma once
 
 #include <cstdint>
@@ -23,7 +23,7 @@ struct SceneMaterials;
 /// Tangents of one mesh in its local space, encoded by core/encoding/octahedral.h. The code is
 /// kNoDirection where tangents cancel out and on triangles without area in texture space.
 struct MeshTangents {
-  /// One encoded tangent per vertex or corner, for one motion step after another.
+  /// One encoded tangent per vertex or corner, for each motion step in turn.
   std::vector<uint32_t> codes;
   bool at_corners = false;  ///< whether some vertex has more than one tangent
 };
@@ -41,8 +41,8 @@ struct TangentRecord {
   uint32_t pad = 0;
 };
 
-/// Tangents of the meshes with a material that needs them: an anisotropic material, one with a
-/// normal map, or one whose graph reads tangents. Other meshes use no memory for tangents.
+/// Tangents of the meshes with a material that needs them: a material that is anisotropic, has a
+/// normal map, or has a graph that reads tangents. Other meshes use no memory for tangents.
 struct SceneTangents {
   /// Makes the tangents of a scene. `before` holds the tangents of a scene with the same geometry,
   /// which are reused where possible; it may be null.

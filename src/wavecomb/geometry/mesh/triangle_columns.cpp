@@ -45,7 +45,7 @@ TriangleColumns::TriangleColumns(const Mesh& mesh)
     for (uint32_t y = cell(y0, low_[1], per_unit_[1]); y <= above; ++y)
       for (uint32_t x = from; x <= to; ++x) visit(size_t{y} * side_ + x);
   };
-  // Use fewer grid cells if many triangles overlap many cells, as in a triangle fan.
+  // Use fewer grid cells if many triangles each overlap many cells, as in a triangle fan.
   for (;; side_ /= 2) {
     for (int k = 0; k < 2; ++k)
       per_unit_[k] = high_[k] > low_[k] ? static_cast<float>(side_) / (high_[k] - low_[k]) : 0.f;

@@ -62,7 +62,7 @@ Welded weld_corners(std::span<const int32_t> corners, uint32_t vertex_count,
   check_count("components of a face-varying primvar", values.size(), corners.size() * width);
   Welded out;
   out.indices.resize(corners.size());
-  // For each point, a linked list of the corners with distinct values found so far.
+  // For each point, a linked list of those previous corners that introduced a new value.
   constexpr uint32_t kEnd = ~0u;
   std::vector<uint32_t> first(vertex_count, kEnd), next(corners.size(), kEnd);
   for (size_t c = 0; c < corners.size(); ++c) {

@@ -24,8 +24,9 @@ enum class FaceVaryingRule : uint8_t {
   kAll,
 };
 
-/// Indices of face-varying values, one for each corner of the cage. Corners at a vertex are joined
-/// if their indices are equal, and separate otherwise.
+/// Indices of face-varying values, one for each corner of the cage. Values are continuous between
+/// corners of the same vertex if their indices are equal; otherwise, there is a seam between these
+/// corners.
 struct FaceVaryingIndices {
   std::span<const int32_t> indices;
   uint32_t value_count = 0;
@@ -55,8 +56,8 @@ struct Cage {
 /// description of the first fault.
 void check_cage(const Cage& cage);
 
-/// Throws Error that states both counts if `found` differs from `needed`. `things`: plural noun for
-/// the message, such as "components of a primvar".
+/// Throws an Error that states both counts if `found` differs from `needed`. `things`: plural noun
+/// for the message, such as "components of a primvar".
 void check_count(const char* things, size_t found, size_t needed);
 
 /// Face-varying values without duplicates: a value index for each corner, and an array of the
@@ -65,9 +66,9 @@ struct Welded {
   std::vector<int32_t> indices;
   std::vector<float> values;
 };
-/// Merges equal values of corners that share a vertex, bit for bit. `corners` are vertex indices
-/// below `vertex_count`; `values` is (corners, width). Throws Error if vertex indices or array
-/// sizes are invalid.
+/// Merges equal values of corners that share a vertex, without a tolerance. `corners` are vertex
+/// indices below `vertex_count`; `values` is (corners, width). Throws Error if vertex indices or
+/// array sizes are invalid.
 Welded weld_corners(std::span<const int32_t> corners, uint32_t vertex_count,
                     std::span<const float> values, uint32_t width);
 

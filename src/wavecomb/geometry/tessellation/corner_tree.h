@@ -76,9 +76,9 @@ class CornerTree {
 
   /// Finds a position inside or on the counter-clockwise triangle a, b, c that still has corners
   /// and is not a vertex of the triangle. Returns kNone if no such position exists. If several
-  /// positions qualify, returns a pseudo-random one. It is unlikely to be removed soon, which saves
-  /// searches: each removal of a blocking position requires another search. Adds the number of
-  /// visited nodes to `steps`.
+  /// positions qualify, returns a pseudo-random one. A random position is unlikely to be removed
+  /// soon; this saves searches, since each removal of a blocking position requires another search.
+  /// Adds the number of visited nodes to `steps`.
   uint32_t find(const Corner& a, const Corner& b, const Corner& c, uint64_t& steps) {
     const double lo_x = std::min({a.x, b.x, c.x}), hi_x = std::max({a.x, b.x, c.x});
     const double lo_y = std::min({a.y, b.y, c.y}), hi_y = std::max({a.y, b.y, c.y});

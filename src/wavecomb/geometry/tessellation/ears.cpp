@@ -103,7 +103,7 @@ class Clipper {
     uint32_t position = kNone, next = kNone, previous = kNone;
   };
 
-  /// Returns the first ear at or after corner `start_corner`, or `start_corner` if there is none.
+  /// Returns the first ear at or after corner `start_corner`, or `start_corner` if no ear is left.
   uint32_t next_ear(uint32_t start_corner) {
     for (uint32_t at = start_corner;;) {
       uint32_t found = open_.next(at);

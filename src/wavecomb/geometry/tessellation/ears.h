@@ -12,7 +12,7 @@ namespace wavecomb {
 struct PolygonTriangulation {
   /// Corner indices, 3 per triangle. A polygon with n corners is divided into n - 2 triangles.
   std::vector<int64_t> corners;
-  /// Number of corners cut without a test after the step limit.
+  /// Number of corners that were cut without an ear test after the step limit was reached.
   uint64_t untested = 0;
 };
 
@@ -21,15 +21,15 @@ struct PolygonTriangulation {
 /// 5,000 corners needs one fiftieth.
 inline constexpr uint64_t kMaxClippingSteps = uint64_t{1} << 26;
 
-/// Triangulates a polygon in the plane, counter-clockwise, by clipping ears from its first corner
-/// on (G. Meisters, "Polygons Have Ears", 1975). A corner is an ear if no other remaining corner
-/// lies in or on its triangle. Corners that coincide with a vertex of the triangle do not count,
-/// since they occur where holes are joined to the outline. If no ear is left, the polygon
+/// Triangulates a counter-clockwise polygon in the plane by clipping ears, starting at its first
+/// corner (G. Meisters, "Polygons Have Ears", 1975). A corner is an ear if no other remaining
+/// corner lies in or on its triangle. Corners that coincide with a vertex of the triangle do not
+/// count, since they occur where holes are joined to the outline. If no ear is left, the polygon
 /// intersects itself, and the next corner is cut regardless.
 ///
-/// A corner is tested again only after its neighbours changed or the corner that blocked it was
-/// removed. A k-d tree finds blocking corners. In the worst known cases, self-intersecting polygons
-/// included, n corners take O(n sqrt(n)) steps.
+/// After a failed test, a corner is tested again only if one of its neighbours changes or the
+/// corner that blocked it is removed. A k-d tree finds blocking corners. In the worst known cases,
+/// including self-intersecting polygons, n corners take O(n sqrt(n)) steps.
 ///
 /// `flat` holds x and y of each corner. If a coordinate is not finite, the result is a triangle
 /// fan. After `max_steps` steps, the remaining corners are cut without testing whether they are

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Evaluation of OpenSubdiv's vertex masks in bands of vertices, on any number of threads.
 ///
-/// OpenSubdiv's Far::PrimvarRefiner computes the same values, but a whole level per call on one
-/// thread. The functions here use the masks and the order of additions of OpenSubdiv, so their
-/// results are bitwise equal. These functions require uniform refinement, in which every vertex has
-/// all its neighbours.
+/// OpenSubdiv's Far::PrimvarRefiner computes the same values, but processes a whole level per call
+/// on one thread. The functions here use the masks and the order of additions of OpenSubdiv, so
+/// their results are bitwise equal. These functions require uniform refinement, in which every
+/// vertex has all its neighbours.
 #pragma once
 
 #include <opensubdiv/far/topologyLevel.h>
@@ -40,7 +40,8 @@ class Mask {
  public:
   using Weight = float;
 
-  /// Reserves room for a vertex with `around` edges or faces, or for an edge with `around` faces.
+  /// Clears the mask and makes room for a vertex with `around` edges or faces, or for an edge with
+  /// `around` faces.
   void fit(int around) {
     const size_t size = 1 + 2 * (static_cast<size_t>(around) + 2);
     if (weights_.size() < size) weights_.resize(size);
@@ -121,7 +122,7 @@ void in_bands(int n, Make&& make) {
   });
 }
 
-/// Returns the end of an edge that is not `vertex`.
+/// Returns the end vertex of an edge other than `vertex`.
 inline int other_end(const Far::TopologyLevel& level, int edge, int vertex) {
   const Far::ConstIndexArray ends = level.GetEdgeVertices(edge);
   return ends[0] == vertex ? ends[1] : ends[0];

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Fast path for common meshes: all triangles or all quads, indices in range, points at moderate
-/// coordinates. All other meshes use the general code path, which reports errors.
+/// Fast path for plain meshes, which have only triangles or only quads, valid indices, and points
+/// with moderate coordinates. All other meshes use the general code path, which reports errors.
 #pragma once
 
 #include <array>
@@ -14,8 +14,8 @@ namespace wavecomb {
 /// Lowest and highest coordinates of a set of points.
 using PointBounds = std::array<std::array<float, 3>, 2>;
 
-/// Transforms points in double precision: x' = x m00 + y m10 + z m20 + m30. All products but the
-/// first use fma, as a BLAS matrix product does.
+/// Transforms points in double precision: x' = x m00 + y m10 + z m20 + m30. Each sum uses fma for
+/// all products except the first, as a BLAS matrix product does.
 ///
 /// `points`, `out`: 3 per point. `matrix`: 4 x 4, for row vectors.
 void bake_points(std::span<const float> points, std::span<const double, 16> matrix,
@@ -45,9 +45,9 @@ size_t mark_used_points(std::span<const uint32_t> triangles, std::span<uint8_t> 
 /// A plain mesh in the space of its group.
 struct PlainMesh {
   uint32_t corners_per_face = 0;    ///< 3 or 4
-  std::vector<float> positions;     ///< 3 per point; empty if the transform is the identity
-  std::vector<int64_t> split;       ///< for quads the result of `split_quads`
-  std::vector<uint32_t> triangles;  ///< for quads the points of `split`
+  std::vector<float> positions;     ///< 3 floats per point; empty if the transform is the identity
+  std::vector<int64_t> split;       ///< result of `split_quads`; empty for triangles
+  std::vector<uint32_t> triangles;  ///< point indices for `split`; empty for triangles
   PointBounds bounds;
 };
 
@@ -66,10 +66,10 @@ struct PlainMeshes {
   std::vector<uint32_t> triangles;        ///< 3 per triangle, relative to the mesh's first point
   std::vector<uint32_t> triangle_counts;  ///< 1 per mesh
   std::vector<PointBounds> bounds;        ///< 1 per mesh
-  std::vector<uint8_t> uses_all_points;   ///< 1 per mesh: whether triangles use all its points
+  std::vector<uint8_t> uses_all_points;   ///< 1 per mesh: whether the triangles use all points
 };
 
-/// Sizes of a mesh in common arrays.
+/// Numbers of elements of one mesh in the common arrays.
 struct MeshSizes {
   uint32_t points, faces, corners;
 };
@@ -77,7 +77,8 @@ struct MeshSizes {
 /// Converts meshes up to the first one that is not plain.
 ///
 /// `points`, `counts` and `indices` hold one mesh after another and have the sizes that `sizes`
-/// adds up to. `matrices`: 16 numbers per mesh. Arguments are otherwise as in `make_plain_mesh`.
+/// adds up to. `matrices`: 16 numbers per mesh. The other arguments have the same meaning as in
+/// `make_plain_mesh`.
 PlainMeshes make_plain_meshes(std::span<const float> points, std::span<const int32_t> counts,
                               std::span<const int32_t> indices, std::span<const MeshSizes> sizes,
                               std::span<const double> matrices, double limit);

@@ -21,7 +21,7 @@ std::vector<int64_t> split_quads(std::span<const float> points, std::span<const 
       p[k] = {at[0], at[1], at[2]};
     }
     const Point d1 = p[1] - p[0], d2 = p[2] - p[0], d3 = p[3] - p[0];
-    // The sum of the two triangle normals is the quad's normal for both diagonals.
+    // For both diagonals, the sum of the two triangle normals is the quad's normal.
     const Point turn0 = cross_of(d1, d2), turn1 = cross_of(d2, d3), turn2 = cross_of(d1, d3);
     const Point normal = turn0 + turn1;
     const double a = dot_of(turn0, normal), b = dot_of(turn1, normal), c = dot_of(turn2, normal);

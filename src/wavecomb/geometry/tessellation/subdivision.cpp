@@ -124,8 +124,8 @@ struct Subdivision::Refiner {
     });
   }
 
-  /// Refines values of the cage level by level with `step(level, from, to)`; size(level) is the
-  /// number of values on a level.
+  /// Refines values of the cage level by level by calls of `step(level, from, to)`; size(level) is
+  /// the number of values on a level.
   template <typename V, typename Size, typename Step>
   std::vector<V> refine(std::span<const float> values, Size&& size, Step&& step) const {
     const size_t width = sizeof(V) / sizeof(float);
@@ -277,7 +277,7 @@ std::vector<uint32_t> Subdivision::normal_sectors(const RefinedFaces& faces,
   const auto sharp = [&](int e) {
     const Far::ConstIndexArray around = last.GetEdgeFaces(e);
     if (around.size() != 2 || last.GetEdgeSharpness(e) > 0) return true;
-    // A bilinear surface has a sharp edge wherever the cage has an edge.
+    // On a bilinear surface, all edges of the cage are sharp.
     return refiner_->scheme == Scheme::kBilinear &&
            refiner_->base_of(around[0]) != refiner_->base_of(around[1]);
   };
@@ -304,7 +304,7 @@ std::vector<uint32_t> Subdivision::normal_sectors(const RefinedFaces& faces,
   std::vector<int> sector;
   const auto number = [&](int v) {
     const Far::ConstIndexArray around = last.GetVertexFaces(v), edges = last.GetVertexEdges(v);
-    // Faces that share a smooth edge form a sector, numbered by the lowest index of its faces.
+    // Faces connected by smooth edges form a sector. Its number is the lowest index of its faces.
     sector.resize(static_cast<size_t>(around.size()));
     std::iota(sector.begin(), sector.end(), 0);
     for (const int e : edges) {

@@ -39,8 +39,8 @@ class Subdivision {
   ~Subdivision();
   Subdivision(Subdivision&&) noexcept;
 
-  /// Returns whether at most two faces meet at each edge, and only one fan of faces at each vertex.
-  /// Non-manifold edges and vertices are kept sharp.
+  /// Returns whether each edge belongs to at most two faces, and the faces at each vertex form a
+  /// single fan. Non-manifold edges and vertices are kept sharp.
   bool is_manifold() const;
   /// Returns the number of vertices of the finest level.
   uint32_t vertex_count() const;
@@ -53,9 +53,9 @@ class Subdivision {
   std::vector<uint32_t> face_varying_corners(uint32_t channel) const;
 
   /// Returns the index of the normal for each corner of `faces`. At smooth vertices, the normal has
-  /// the index of the vertex. If sharp edges divide the faces of a vertex into sectors, each
-  /// further sector has a normal whose index is vertex_count() or more. Sets `count` to the number
-  /// of normals.
+  /// the index of the vertex. If sharp edges divide the faces of a vertex into sectors, each sector
+  /// except the first has an additional normal, whose index is vertex_count() or more. Sets `count`
+  /// to the number of normals.
   std::vector<uint32_t> normal_sectors(const RefinedFaces& faces, uint32_t& count) const;
 
   /// Evaluates a vertex primvar of the cage on the limit surface; returns an array of shape

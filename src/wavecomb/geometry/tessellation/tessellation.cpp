@@ -28,9 +28,9 @@ struct Work {
   std::vector<uint32_t> uv_at;
 };
 
-/// Determines which normals are computed as sums over faces. Returns for each normal its index in
-/// the list of sums, or ~0 for normals that equal the limit normal. A vertex with a single normal
-/// uses the limit normal in `work.normals` if it is not 0.
+/// Determines which normals are computed as sums over faces. Returns, for each normal, its index in
+/// the list of sums, or ~0 if it is the limit normal. A vertex with a single normal uses the limit
+/// normal in `work.normals` unless this is 0.
 std::vector<uint32_t> sum_indices(const Work& work, size_t normal_count, size_t& sum_count) {
   const size_t known = work.normals.size() / 3, points = work.faces.vertex_count;
   std::vector<uint32_t> sum_of_normal(normal_count, ~0u);
@@ -45,7 +45,7 @@ std::vector<uint32_t> sum_indices(const Work& work, size_t normal_count, size_t&
   return sum_of_normal;
 }
 
-/// Calls f(corner, first, end) on each thread for all corners in order. Each thread handles a
+/// Calls f(corner, first, end) for all corners in order, on each thread. Each thread handles a
 /// separate range [first, end) of the `count` accumulators, so sums do not depend on the number of
 /// threads.
 template <typename F>
@@ -56,9 +56,9 @@ void each_corner(size_t corners, size_t count, F&& f) {
   });
 }
 
-/// Computes normals. A vertex with a single normal keeps the limit normal in `work` if it is not 0.
-/// All other normals are normalised sums of area-weighted corner normals over the faces of a sector
-/// (subdivision.h).
+/// Computes normals. A vertex with a single normal keeps the limit normal in `work` unless this is
+/// 0. All other normals are normalised sums of area-weighted corner normals over the faces of a
+/// sector (subdivision.h).
 void set_normals(Work& work, size_t normal_count) {
   size_t sum_count = 0;
   const std::vector<uint32_t> sum_of_normal = sum_indices(work, normal_count, sum_count);
@@ -137,8 +137,9 @@ double distance2(const std::vector<float>& positions, uint32_t a, uint32_t b) {
   return dot_of(d, d);
 }
 
-/// Writes the triangles, with a point for each combination of normal and texture coordinate. If not
-/// null, `origins` receives for each triangle corner the index of its corner in `work`.
+/// Writes the triangles. Each combination of normal and texture coordinate at a vertex becomes a
+/// point. If `origins` is not null, it receives, for each triangle corner, the index of the same
+/// corner in `work`.
 void emit(const Work& work, bool reversed, SurfaceMesh& mesh, std::vector<uint32_t>* origins) {
   const uint32_t k = work.faces.size;
   const size_t corners = work.faces.corners.size();
@@ -202,7 +203,7 @@ void emit(const Work& work, bool reversed, SurfaceMesh& mesh, std::vector<uint32
   });
 }
 
-/// Primvar on the refined faces: its values, and the value index of each corner.
+/// Primvar on the refined faces: a list of values, and the index into this list for each corner.
 struct Spread {
   std::vector<float> values;
   std::vector<uint32_t> at;
@@ -224,7 +225,8 @@ Spread spread(const SurfacePrimvar& primvar, const Subdivision& surface,
   return {};
 }
 
-/// Returns a primvar on the corners of a surface that is triangulated but not subdivided.
+/// Returns the values of a primvar at the corners of a surface that is triangulated but not
+/// subdivided.
 Spread spread_polygons(const SurfacePrimvar& primvar, const RefinedFaces& faces) {
   Spread out{{primvar.values.begin(), primvar.values.end()}, faces.corners};
   if (primvar.kind == PrimvarKind::kFaceVarying) std::iota(out.at.begin(), out.at.end(), 0u);
@@ -234,8 +236,8 @@ Spread spread_polygons(const SurfacePrimvar& primvar, const RefinedFaces& faces)
   return out;
 }
 
-/// Transfers a primvar from the refined faces to the triangles. `origins` holds for each triangle
-/// corner the index of its corner on the refined faces.
+/// Transfers a primvar from the refined faces to the triangles. `origins` holds, for each triangle
+/// corner, the index of the same corner of the refined faces.
 SurfaceValues on_triangles(const Spread& spread, uint32_t width,
                            const std::vector<uint32_t>& origins, const SurfaceMesh& mesh) {
   SurfaceValues out;
@@ -353,7 +355,7 @@ SurfaceMesh make_surface(const SurfaceDesc& desc) {
       primvars[i] = spread(desc.primvars[i], surface, work.faces);
     });
   }
-  // Compute normals only now that OpenSubdiv's tables have been released, to limit peak memory.
+  // Compute normals only after OpenSubdiv's tables have been released, to limit peak memory.
   if (desc.level > 0) set_normals(work, normal_count);
   if (!desc.displacements.empty()) {
     displace(work, desc);

@@ -78,8 +78,9 @@ struct SurfaceMesh {
 
 /// Triangulates the surface. Points lie on the limit surface and have the normals of the limit
 /// surface. Displaced points move along the limit normal by the mean displacement of the adjacent
-/// faces, so no gaps open at seams of texture coordinates or materials; their normals are computed
-/// from the displaced triangles. Throws Error with a one-line description if the input is invalid.
+/// faces, so that no gaps open at seams of texture coordinates or materials. Normals of displaced
+/// points are computed from the displaced triangles. Throws Error with a one-line description if
+/// the input is invalid.
 SurfaceMesh make_surface(const SurfaceDesc& desc);
 
 }  // namespace wavecomb

@@ -17,8 +17,8 @@ struct GraphParameter {
   float low, high;
 };
 
-/// Material parameters that graphs can drive: first the textured inputs and ior, then the
-/// additional inputs of program "openpbr" in the order of OpenPbrRecord.
+/// Material parameters that graphs can drive. The textured inputs and ior come first, followed by
+/// the additional inputs of the shading program "openpbr" in the order of OpenPbrRecord.
 inline constexpr GraphParameter kGraphParameters[] = {{"base_color", 3, 0, 1},
                                                       {"specular_color", 3, 0, 1},
                                                       {"emission", 3, 0, 1e18f},

@@ -19,9 +19,9 @@ bool bounded(const ValueRange& r) {
   return std::isfinite(r.low) && std::isfinite(r.high);
 }
 
-/// Returns the range of a function that, like a sum or product, is monotonic in each operand if the
-/// other operands are fixed. Rounding preserves order, so the extremes lie at the ends of the
-/// operands' ranges.
+/// Returns the range of a function that is monotonic in each operand while the others are fixed,
+/// such as a sum or product. The extremes then lie at the ends of the operands' ranges, since
+/// rounding preserves order.
 template <typename Function>
 ValueRange at_ends(const Function& f, const ValueRange& a, const ValueRange& b,
                    const ValueRange& c = exactly(0)) {
@@ -64,7 +64,7 @@ ValueRange less_of(const ValueRange& a, const ValueRange& b) {
 }
 
 ValueRange divide_of(const ValueRange& a, const ValueRange& b) {
-  // The quotient is monotonic only if the divisor does not change sign.
+  // The quotient is monotonic only if the range of the divisor does not contain a change of sign.
   if (b.low <= 0 && b.high >= 0) return {};
   return at_ends([](float x, float y, float) { return x / y; }, a, b);
 }

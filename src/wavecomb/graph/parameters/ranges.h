@@ -19,9 +19,9 @@ struct ValueRange {
   bool nan = true;
 };
 
-/// For each component of GraphParameter, the range of values that a graph can write, clamped to the
-/// range of the parameter and never NaN; an entry is empty if the graph does not drive the
-/// component.
+/// Range of values that a graph can write to each component of GraphParameter. Ranges are clamped
+/// to the limits of the parameter and never include NaN. The entry of a component that the graph
+/// does not drive is empty.
 using DrivenRanges = std::array<std::optional<ValueRange>, kGraphOutputCount>;
 
 /// Computes the ranges of the outputs of graph program `graph` (kNoGraph for none) over all hits.

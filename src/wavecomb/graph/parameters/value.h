@@ -27,8 +27,8 @@ inline F valid_output(uint32_t i, const F& value) {
   return clamp(value, F(kGraphRanges.low[i]), F(kGraphRanges.high[i]));
 }
 
-/// Returns the three parameter components from index `first` on. A component that the lane's graph
-/// does not drive has its value from `plain`.
+/// Returns the three parameter components that start at index `first`. Components that the lane's
+/// graph does not drive keep their value in `plain`.
 template <typename F>
 [[gnu::noinline]] Vec3<F> graph_value(const MaterialView& view, const UInt<F>& graph,
                                       uint32_t first, const GraphPoint<F>& at,

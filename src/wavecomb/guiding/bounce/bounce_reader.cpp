@@ -57,7 +57,7 @@ void BounceReader::read(const PathHistory& history, uint32_t slot, const Color<f
   std::array<bool, kVertices> is_sample;
   uint32_t count = 0;
   Color<float> throughput(1.f);
-  double reached = 1;  // Probability that a path with roulette reaches the vertex.
+  double reached = 1;  // Probability with which a path reaches the vertex if roulette is used.
   // The vertex at the maximum depth has no bounce.
   for (; count < std::min(history.count(slot), plan_.max_depth); ++count) {
     const HistoryRow<float> v = history.vertex(slot, count);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Collects training samples for path guiding, in path order, independent of which worker traced a
-/// path.
+/// Collects training samples for path guiding. The samples are in the order of the paths,
+/// independently of which worker traced a path.
 #pragma once
 
 #include <cstdint>
@@ -42,7 +42,8 @@ struct TrainingPlan {
   uint32_t first, samples;  ///< first sample index and number of samples of each pixel
   uint32_t max_depth;
   const GuidingGrid& grid;
-  GuidingView guide;        ///< guiding field of the bounces; empty if bounces are not guided
+  GuidingView guide;        ///< guiding field that samples the bounces; empty if bounces are not
+                            ///< guided
   const ImageTiles* tiles;  ///< brightness of the image by tile; null if unknown
   PathCosts costs;
   uint32_t roulette_depth;

@@ -5,9 +5,9 @@
 ///
 /// where a is GuidingLookup::bsdf_share, and p_bsdf is the density of unguided bounces, which
 /// sample the lobes of the BSDF or, with cosine sampling, a cosine lobe (bounce_sampling.h). The
-/// guiding distribution covers only the viewer's side of a surface, so only the BSDF samples
-/// transmission. The selection probability of a delta lobe is `a` times its selection probability
-/// in the BSDF. The MIS weights of bounces and light samples use the density p of the mixture.
+/// guiding distribution covers only the viewer's side of a surface, so transmission is sampled only
+/// by the BSDF. The selection probability of a delta lobe is `a` times its selection probability in
+/// the BSDF. The MIS weights of bounces and light samples use the density p of the mixture.
 #pragma once
 
 #include "wavecomb/guiding/lookup.h"
@@ -39,8 +39,8 @@ WAVECOMB_INLINE GuidingLookup<F> guiding_lookup(const Vertex<F, kFeatures>& v,
   return {};
 }
 
-/// Returns the density of the mixture for a bounce along `world`, which is `wi` in the frame whose
-/// z axis is the normal. `p_bsdf` is the density of the BSDF for this direction.
+/// Returns the density of the mixture for a bounce along `world`. `wi` is the same direction in the
+/// frame whose z axis is the normal. `p_bsdf` is the density of the BSDF for this direction.
 template <typename Bsdf, typename F, uint32_t kFeatures>
 WAVECOMB_INLINE F mixed_pdf(const Vertex<F, kFeatures>& v, const GuidingLookup<F>& guiding,
                             const Vec3<F>& world, const Vec3<F>& wi, const Vec3<F>& wo,
@@ -57,9 +57,9 @@ WAVECOMB_INLINE F mixed_pdf(const Vertex<F, kFeatures>& v, const GuidingLookup<F
 }
 
 /// Replaces the bounce `b`, which was sampled from the BSDF, by a sample of the mixture of BSDF and
-/// guiding distribution. The random number `r.w` selects one of the two distributions. The ray cone
-/// always uses the roughness of the sampled BSDF lobe. Writes the training data of the bounce to
-/// `out`.
+/// guiding distribution. The random number `r.w` selects one of the two distributions. In both
+/// cases, the ray cone uses the roughness of the BSDF lobe that was sampled first. Writes the
+/// training data of the bounce to `out`.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Coupling>
 WAVECOMB_INLINE void guided_bounce(const VertexContext<Bsdf, F, kFeatures, Coupling>& c,
                                    const Sample4<F>& r, BsdfSample<F>& b, VertexResult<F>& out) {

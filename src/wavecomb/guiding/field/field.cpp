@@ -13,9 +13,9 @@ namespace {
 
 /// Maximum number of training records in a cell; cells with more records are divided.
 constexpr size_t kCellRecords = 2048;
-/// Factor by which the survival probability of roulette is increased. Moments from few training
-/// paths miss rare light. Terminating paths too often where rare light arrives causes bright
-/// pixels, while continuing paths too often costs only a few rays.
+/// Factor by which the survival probability of roulette is increased. Moments that are estimated
+/// from few training paths miss rare light. Terminating paths too often where rare light arrives
+/// causes bright pixels, whereas continuing paths too often costs only a few rays.
 constexpr double kSafety = 1.5;
 
 }  // namespace

@@ -4,17 +4,18 @@
 ///
 /// The cells form an octree over the bounds of the scene. A cell with more than kCellRecords
 /// contributing bounces is divided. A region is the part of a cell whose surfaces face one axis
-/// direction. The distribution of a region is the mean value of its bounces by direction. If a
-/// region has few bounces, its distribution is blended with the distribution q of the parent cell:
+/// direction. The distribution of a region is the mean value of its bounces as a function of
+/// direction. If a region has few bounces, its distribution is blended with the distribution q of
+/// the parent cell:
 ///   p = (n p_own + kPrior q) / (n + kPrior)   for n bounces.
 ///
-/// The fraction a of a region's bounces that the BSDF samples minimises the second moment of the
-/// mixture, estimated from the same bounces. For values x sampled with density p, and the densities
-/// p_b of the BSDF and p_g of the guiding field:
+/// In each region, the BSDF samples a fraction a of the bounces. The field chooses the fraction
+/// that minimises the second moment of the mixture, as estimated from the training bounces. For
+/// values x sampled with density p, and the densities p_b of the BSDF and p_g of the guiding field:
 ///   S(a) = sum of x^2 p / (a p_b + (1 - a) p_g).
 /// The candidates for a are the values in kBsdfShares; a = 1 is chosen where guiding does not help.
 ///
-/// Equal records give bitwise equal fields, on any number of threads (field_builder.h).
+/// Equal training records give bit-identical fields, on any number of threads (field_builder.h).
 #pragma once
 
 #include <array>
@@ -44,9 +45,9 @@ class GuidingField {
   /// bounce_position_key().
   explicit GuidingField(const GuidingGrid& grid) : grid_(grid) {}
   /// Builds a field from training records. `materials` is the number of materials. If `first` is
-  /// true, the records contain no densities of an earlier field, so the field samples half of the
-  /// bounces in each region. If `guides` is false, the BSDF samples all bounces. The cell size
-  /// doubles until the field takes at most `max_bytes` or cannot shrink further.
+  /// true, the records contain no densities of an earlier field, so the BSDF and the field each
+  /// sample half of the bounces in each region. If `guides` is false, the BSDF samples all bounces.
+  /// The cell size doubles until the field takes at most `max_bytes` or cannot shrink further.
   GuidingField(const GuidingGrid& grid, std::span<const TrainingRecord> records, size_t materials,
                bool first, bool guides, size_t max_bytes);
   /// Restores a field that was saved for a scene with `materials` materials. Throws Error if the

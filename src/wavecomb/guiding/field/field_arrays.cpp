@@ -11,9 +11,9 @@
 namespace wavecomb {
 namespace {
 
-/// Returns whether the grid is valid: kGuidingTopCells entries followed by bricks. Each brick
-/// divides exactly one entry and is at most kGuidingLevels deep. Every entry that is not divided
-/// refers to a cell with an index below `cells`.
+/// Returns whether the grid is valid: kGuidingTopCells entries followed by bricks. No two entries
+/// refer to the same brick, and bricks are nested at most kGuidingLevels deep. Every entry that is
+/// not divided refers to a cell with an index below `cells`.
 bool is_grid(std::span<const uint32_t> entries, size_t cells) {
   if (entries.size() < kGuidingTopCells ||
       (entries.size() - kGuidingTopCells) % kGuidingBrickCells != 0)
@@ -41,8 +41,8 @@ bool is_grid(std::span<const uint32_t> entries, size_t cells) {
   return true;
 }
 
-/// Returns whether a row of a sampling table assigns all 65536 sample values to bins, and at least
-/// one value to each bin.
+/// Returns whether a row of a sampling table is valid: it assigns each of the 65536 sample values
+/// to a bin, and at least one sample value to each bin.
 bool is_row(std::span<const uint32_t> words) {
   uint32_t start = 0;
   for (const uint32_t word : words) {

@@ -13,18 +13,18 @@
 namespace wavecomb {
 namespace {
 
-/// Maximum number of training records from which the direction distribution of a node is computed.
+/// Maximum number of training records that contribute to the direction distribution of a node.
 constexpr size_t kDirections = 8192;
 /// Weight of the parent node's distribution and moments, as an equivalent number of training
 /// records.
 constexpr double kPrior = 64;
-/// Minimum number of training records at a material for computing the minimum of `bsdf_share` for
-/// the material.
+/// Minimum number of a material's training records from which the minimum of `bsdf_share` for this
+/// material is computed.
 constexpr double kMaterialRecords = 512;
 /// Fraction of bounces that the BSDF samples in the first round, before moments are known.
 constexpr float kFirstShare = 0.5f;
-/// Number of training records of a node from which its children are computed in parallel, and of
-/// records that are converted together.
+/// Minimum number of training records of a node whose children are computed in parallel, and number
+/// of records that one task converts.
 constexpr size_t kParallelRecords = 4096, kBand = 8192;
 
 /// Returns the limit to which values are clamped, so that no single value dominates: sqrt(n) times
@@ -201,7 +201,7 @@ void GuidingFieldBuilder::compute_regions(uint32_t index, const Distributions* a
   if (std::none_of(node.is_used.begin(), node.is_used.end(), [](bool used) { return used; }))
     return;
   const double cut = largest(std::span(records_).subspan(node.begin, node.end - node.begin));
-  // The distributions are too large for the stack of a recursion.
+  // Allocate the distributions on the heap, since they are too large for the stack of a recursion.
   const auto own = std::make_unique<Distributions>();
   std::vector<const TrainingRecord*> bounces;
   for (uint32_t axis = 0; axis < kGuidingAxes; ++axis) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Construction of the guiding field from training records (field.h).
 ///
-/// 1. The octree is divided by numbers of records alone.
+/// 1. The octree is built. Its division depends only on numbers of records.
 /// 2. Cells and regions are numbered in the order of the octree, since regions also depend on
 ///    numbers of records only.
 /// 3. The distributions of the regions are computed, in parallel for different subtrees. Each
@@ -61,7 +61,7 @@ class GuidingFieldBuilder {
     std::array<size_t, kGuidingAxes> counts{};
     /// Region of the records of each axis direction, or kNoGuidingRegion if it was not created.
     std::array<uint32_t, kGuidingAxes> regions{};
-    /// Whether the distribution of an axis direction is needed, here or in the subtree.
+    /// Whether this node or a node below it needs the distribution of an axis direction.
     std::array<bool, kGuidingAxes> is_used{};
   };
 
@@ -76,7 +76,7 @@ class GuidingFieldBuilder {
   using Distributions = std::array<Distribution, kGuidingAxes>;
 
   void compute_material_fractions(size_t materials);
-  /// Adds the node with the given records, and the nodes below.
+  /// Adds a node for the given records, and the nodes of its subtree.
   void divide(uint32_t depth, uint32_t code, size_t begin, size_t end, uint32_t parent);
   /// Returns the region of a node and an axis direction. A node with too few records uses the
   /// region of the nearest ancestor with enough records, or kNoGuidingRegion if there is none.
@@ -88,8 +88,8 @@ class GuidingFieldBuilder {
   /// Computes the regions of a node and of the nodes below. `above` holds the distributions of the
   /// parent, or is null for the root.
   void compute_regions(uint32_t index, const Distributions* above);
-  /// Computes the distribution of the records `bounces`, blended with that of the parent node,
-  /// which may be null. Values are clamped to `cut`.
+  /// Computes the distribution of the records `bounces`, blended with the distribution `above` of
+  /// the parent node, which may be null. Values are clamped to `cut`.
   static void blend(Bounces bounces, double cut, const Distribution* above, Distribution& out);
   void write_region(uint32_t region, const Distribution& distribution);
   /// Adds the records of a cell to the statistics.

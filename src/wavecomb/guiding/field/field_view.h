@@ -15,9 +15,9 @@ namespace wavecomb {
 /// Number of direction bins per axis of the equal-area square. A bin is about 7 degrees wide.
 inline constexpr uint32_t kGuidingSide = 32;
 inline constexpr uint32_t kGuidingBins = kGuidingSide * kGuidingSide;
-/// Number of 32-bit words in the table of a region: one marginal row, then one conditional row for
-/// each of its bins. The low half of a word is the first of the 65536 sample values that select a
-/// bin, the high half is the number of these values.
+/// Number of 32-bit words in the table of a region, which consists of a marginal row and a
+/// conditional row for each bin of the marginal row. The low half of a word is the first of the
+/// 65536 sample values that select a bin, the high half is the number of these values.
 inline constexpr uint32_t kGuidingWords = kGuidingSide + kGuidingBins;
 /// Number of axis directions that a surface can face: +x, -x, +y, -y, +z, -z.
 inline constexpr uint32_t kGuidingAxes = 6;
@@ -42,9 +42,10 @@ struct GuidingView {
   const uint32_t* tables = nullptr;  ///< kGuidingWords per region
   /// Sphere of each region on which its incident light is assumed to lie.
   const ParallaxSphere* spheres = nullptr;
-  const float* bsdf_share = nullptr;  ///< probability in each region that the BSDF samples a bounce
-  /// Survival probability in each region, before clamping, of a path whose throughput equals the
-  /// brightness of the image (guiding/roulette.h).
+  const float* bsdf_share = nullptr;  ///< probability that the BSDF samples a bounce, for each
+                                      ///< region
+  /// For each region, the survival probability, before clamping, of a path whose throughput equals
+  /// the brightness of the image (guiding/roulette.h).
   const float* survival = nullptr;
   const float* material_share = nullptr;  ///< minimum of bsdf_share for each material
   /// One over the brightness of the image, in tile_rows x tile_rows tiles; null if the brightness

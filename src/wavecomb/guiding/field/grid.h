@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Grid over the bounds of the scene, in which the guiding field addresses positions.
+/// Grid over the bounds of the scene. The guiding field represents positions as grid coordinates.
 #pragma once
 
 #include <array>

@@ -8,8 +8,8 @@ namespace wavecomb {
 namespace {
 
 constexpr double kStep = 0x1p-20;  ///< resolution of sums
-/// Lower limit of selection probabilities in the sums of `LightBalance::gains()`. With this limit,
-/// no term of a sum exceeds 2^24, so that a sum of 2^19 terms fits in 64 bits.
+/// Lower limit to which selection probabilities are raised in the sums of `LightBalance::gains()`.
+/// It bounds each term by 2^24, so that a sum of 2^19 terms fits in 64 bits.
 constexpr double kMinShare = 0x1p-8;
 constexpr double kMaxMean = 64;  ///< limit of |N - M|
 constexpr int kIterations = 24;
@@ -52,8 +52,8 @@ std::vector<double> LightBalance::gains(std::span<const double> p) const {
   for (const Sample& s : samples_) cells[s.cell] += term(s).bounces_less_lights;
   for (const Sample& s : samples_) {
     const Term t = term(s);
-    // Estimate N - M (balance.h) by the mean over all vertices of the cell except the sample's
-    // vertex, since including the sample would make the estimate biased.
+    // Estimate N - M (balance.h) by the mean over the vertices of the cell without the sample's own
+    // vertex, which would make the estimate biased.
     const uint64_t others = vertices_[s.cell] - 1;
     double mean = 0;
     if (others > 0)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Selection probabilities of lights from samples, with the multiple importance sampling of light
-/// samples and bounces taken into account.
+/// Estimation of the best selection probabilities of lights from samples, for renders that combine
+/// light samples and bounces by multiple importance sampling.
 ///
 /// A vertex takes one light sample of density p q over directions, where p is the selection
 /// probability of the light and q the density of sampling a direction to it, and one bounce of
@@ -16,7 +16,7 @@
 ///
 /// has the same value for all lights of nonzero probability p. Then p is proportional to the square
 /// root of the second moment for a light that bounces cannot hit, and 0 for a light that bounces
-/// sample as well as light samples do.
+/// sample no worse than light samples.
 #pragma once
 
 #include <array>
@@ -30,15 +30,15 @@ namespace wavecomb {
 /// over samples are integers, so that they do not depend on the order of samples.
 class LightBalance {
  public:
-  /// `shares` are the selection probabilities (> 0) of the parts of the lights (LightParts) with
-  /// which the samples are taken. `cells` is the number of groups of similar vertices, for each of
-  /// which M and N are estimated separately.
+  /// `shares` are the selection probabilities (> 0) with which the samples are taken, one for each
+  /// part of the lights (LightParts). `cells` is the number of groups of similar vertices, for each
+  /// of which M and N are estimated separately.
   LightBalance(std::span<const double> shares, size_t cells);
 
   /// Adds a light sample in part `part` at a vertex in group `cell`. `value` is the contribution of
   /// the light sample times its MIS weight, divided by the brightness of the image around its
-  /// pixel, and `weight` is the MIS weight. Ignores values that are not finite, and clamps to
-  /// kMaxValue the value that the sample would have at a selection probability of 1.
+  /// pixel, and `weight` is the MIS weight. Ignores values that are not finite. Clamps the sample
+  /// so that its value at a selection probability of 1 would be at most kMaxValue.
   void add(size_t cell, size_t part, double value, double weight);
 
   /// Returns the selection probabilities of least variance. A fraction `kFloor` of the total

@@ -14,10 +14,11 @@ namespace wavecomb {
 
 inline constexpr uint32_t kNoPart = 0xffffffffu;
 
-/// Division of all lights that emit into parts. For selection by power, each infinite light, each
-/// finite light and each emissive mesh of an instance is a part. If there would be more than `kMax`
-/// parts, the lights of lowest power together form one part. For selection by tree, each infinite
-/// light is a part, and the tree is the last part.
+/// Division of the lights that emit into parts, each of which has one calibrated selection
+/// probability. For selection by power, each infinite light, each finite light and each emissive
+/// mesh of an instance is a part. If there would be more than `kMax` parts, the lights of lowest
+/// power together form one part. For selection by tree, each infinite light is a part, and the tree
+/// is the last part.
 struct LightParts {
   static constexpr size_t kMax = 64;
   bool by_tree = false;
@@ -35,7 +36,7 @@ struct LightParts {
   uint32_t of(uint32_t light) const;
 };
 
-/// Largest number of lights that are calibrated when selected by power. Each calibrated light needs
+/// Largest number of lights for which selection by power is calibrated. Each calibrated light needs
 /// 8 bytes in addition to its 64 bytes, and about 30 bytes more during calibration. Each light
 /// keeps at least one of the 2^24 random values, and the limit leaves at least half of the values
 /// for calibration.
@@ -46,8 +47,8 @@ inline constexpr size_t kMaxCalibratedLights = size_t{1} << 23;
 /// lights. For selection by tree, returns no parts if the tree has no lights.
 LightParts divide_lights(const Scene& scene, bool by_tree);
 
-/// Calibration of a light tree node: a factor on the odds of its right child against its left
-/// child, which otherwise follow from their importance.
+/// Calibration of a light tree node: a factor on the odds of selecting its right child instead of
+/// its left child. Without calibration, the odds are the ratio of the children's importances.
 struct NodeTilt {
   uint32_t node;
   float odds;
@@ -61,7 +62,7 @@ struct CalibratedLights {
   /// Selection probability of each light; empty for selection by tree.
   std::vector<float> selection_pdf;
   std::vector<uint32_t> power_bins;
-  PowerTable power_table;  ///< table for `power_bins`; `apply()` sets its pointer to them
+  PowerTable power_table;  ///< table whose bins are `power_bins`; `apply()` sets the pointer
   std::vector<uint32_t> infinite_ends;
   std::vector<float> infinite_pdf;
   uint32_t tree_numbers = 0;
@@ -78,8 +79,8 @@ struct CalibratedLights {
 /// Contract: the arguments of the constructor outlive the builder.
 class LightTableBuilder {
  public:
-  /// `tree` is the light tree of `set`. `tree` may have no nodes if no tilts are passed to
-  /// `build_tables()`.
+  /// `tree` is the light tree of `set`. `tree` may have no nodes if `build_tables()` is called
+  /// without tilts (NodeTilt).
   LightTableBuilder(const LightSet& set, const LightTree& tree, const LightParts& parts);
 
   /// Builds tables in which part i has the selection probability shares[i] (> 0, sum 1).

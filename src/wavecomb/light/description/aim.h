@@ -7,8 +7,8 @@
 namespace wavecomb {
 
 /// Target spheres of light paths (docs/light-paths.md, "Aiming"). With probability `even`, a light
-/// path starts with the emission distribution of its light; with probability share[k], it starts
-/// uniformly towards sphere k. These probabilities sum to 1.
+/// path is sampled from the emission distribution of its light. With probability share[k], it is
+/// aimed at sphere k, with a uniform distribution over the sphere. These probabilities sum to 1.
 struct LightAim {
   static constexpr uint32_t kMax = 16;
 

@@ -10,7 +10,7 @@ namespace wavecomb {
 namespace {
 
 /// Returns the integral of sin(x) f(x) dx, where f is linear from a at x0 to b at x1 (radians). The
-/// integral uses the antiderivatives -cos(x) and sin(x) - x cos(x) of sin(x) and x sin(x).
+/// antiderivatives of sin(x) and x sin(x) are -cos(x) and sin(x) - x cos(x).
 double integral(double x0, double x1, double a, double b) {
   if (!(x1 > x0)) return 0;
   const double slope = (b - a) / (x1 - x0);

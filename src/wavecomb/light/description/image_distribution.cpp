@@ -28,7 +28,7 @@ void for_each_overlap(uint64_t i, uint64_t n, uint64_t cells, const Add& add) {
 }
 
 /// Returns the index of the texel before (`step` -1) or after (`step` +1) texel i in a bilinear
-/// lookup; `size` if that texel is black.
+/// lookup, or `size` if the lookup uses black instead of a texel.
 uint32_t neighbour(Wrap wrap, uint32_t i, int step, uint32_t size) {
   const bool off = step < 0 ? i == 0 : i + 1 == size;
   if (!off) return step < 0 ? i - 1 : i + 1;
@@ -75,9 +75,9 @@ class RowMeans {
 };
 
 /// Writes cumulative counts of the given weights. Each entry of positive weight, and the last
-/// entry, gets one count; the remaining counts are distributed by weight. So every entry of
-/// positive weight can be selected, no entry of weight 0 except the last entry can be selected, and
-/// no cumulative count reaches 65536. Returns the sum of the weights.
+/// entry, gets one count; the remaining counts are distributed by weight. Therefore, every entry of
+/// positive weight can be selected, entries of weight 0 cannot be selected except for the last
+/// entry, and no cumulative count reaches 65536. Returns the sum of the weights.
 double accumulate(std::span<const double> weights, uint16_t* cumulative) {
   const size_t n = weights.size();
   double sum = 0;
@@ -116,7 +116,7 @@ Cells cell_means(const TextureView& texture, const Vec3<float>& color, uint32_t 
   Cells cells{std::min(width, kMaxWidth), std::min(height, max_height), {}};
   cells.mean.assign(size_t{cells.width} * cells.height, 0.0);
   const RowMeans means(texture, color, cells.width);
-  // Cell means for the texel rows that have been read but not yet added to `cells`.
+  // Means over columns of cells for each texel row that has been read but not yet added to `cells`.
   std::vector<std::vector<double>> some(std::min(height, kRows));
   const auto mean_of = [&](uint32_t y) {
     if (y % kRows == 0)

@@ -16,8 +16,8 @@
 
 namespace wavecomb {
 
-/// Inputs from which a light kind makes its records, and the light set to which it adds further
-/// data.
+/// Inputs from which a light kind makes its records, and the light set that receives further data
+/// such as portals.
 struct LightBuildContext {
   LightSet& set;           ///< set to which sampling densities, portals and shapings are added
   const LightSet* before;  ///< as in LightInputs
@@ -27,7 +27,8 @@ struct LightBuildContext {
   std::span<const LightFilter> filters;
 };
 
-/// Light record under construction, and the power in W on which its selection probability is based.
+/// Light record that is being built, and the power in W on which its selection probability is
+/// based.
 struct LightBuild {
   LightRecord record{};
   double power = 0;
@@ -51,7 +52,7 @@ struct LightKindInfo {
   /// Sets position, area, radiance and power of a light record. The function is null for mesh
   /// lights, whose records are made by `make_mesh_light()`.
   void (*make)(LightBuild&, const Light&, LightBuildContext&) = nullptr;
-  /// Sets the light's bounds for the light tree; the caller initializes the bounds to the point
+  /// Sets the light's bounds for the light tree; the caller initialises the bounds to the point
   /// `light.p` and the intensity power / pi. The function is null if the light tree does not
   /// contain the kind.
   void (*bound)(LightCluster&, const LightRecord& light, double power) = nullptr;

@@ -15,7 +15,7 @@ namespace wavecomb {
 
 /// Index of a kind of light in the list of light/kinds/kinds.h.
 enum class LightKind : uint8_t;
-/// Kind of mesh lights, equal to LightKind::kTriangle.
+/// Kind of mesh lights, which equals LightKind::kTriangle.
 inline constexpr LightKind kMeshLight = LightKind{6};
 /// Maximum number of parameters specific to one kind of light.
 inline constexpr size_t kMaxSpecificParameters = 4;
@@ -26,7 +26,7 @@ inline constexpr uint32_t kNoFilter = 0xffffffffu;
 inline constexpr uint32_t kPlainShadow = 0xffffffffu;
 inline constexpr uint32_t kNoPortals = 0xffffffffu;
 inline constexpr uint32_t kNoDistribution = 0xffffffffu;
-/// Id that stands for all geometry instead of a `GeometrySet`.
+/// Value of a geometry set id that stands for all geometry.
 inline constexpr uint32_t kNoSet = 0xffffffffu;
 
 /// UsdLuxShapingAPI: dependence of the emission on direction. The axis of the emission is the
@@ -44,15 +44,15 @@ struct Shaping {
   bool is_plain() const { return !(focus > 0) && !(cone_angle < 180) && ies == kNoIes; }
 };
 
-/// UsdLuxShadowAPI: adjustments of a light's shadows that are not physically based.
+/// UsdLuxShadowAPI: adjustments of a light's shadows, which are not physically based.
 struct ShadowAttributes {
-  Vec3<float> color{0, 0, 0};  ///< fraction of the light that arrives in shadow
+  Vec3<float> color{0, 0, 0};  ///< fraction of the light that reaches shadowed points
   /// Maximum world-space distance of an occluder from the shaded surface; a negative value means no
   /// limit.
   float distance = -1;
-  /// Length before `distance` over which shadows fade; 0 or less means no fade.
+  /// Length of the range in front of `distance` in which shadows fade out; 0 or less means no fade.
   float falloff = -1;
-  float gamma = 1;  ///< exponent of the shadow strength where it fades
+  float gamma = 1;  ///< exponent of the shadow strength in this range
 
   bool is_plain() const { return color.x == 0 && color.y == 0 && color.z == 0 && distance < 0; }
 };
@@ -95,13 +95,13 @@ struct IesProfile {
   bool covers_sphere() const { return vertical.back() - vertical.front() > 95.7f; }
 };
 
-/// Relation between the light of a mesh and the emission of its material, which camera and mirror
-/// rays see (UsdLux light:materialSyncMode).
+/// Relation between the light that a mesh casts and the emission of its material, which camera rays
+/// and mirror reflections see (UsdLux light:materialSyncMode).
 enum class MaterialSync : uint32_t {
   kGlowTintsLight,  ///< the light emits the material's emission times the light's colour
-  kIndependent,     ///< the light emits the light's colour alone
+  kIndependent,     ///< the light emits the light's colour, independently of the material
   /// As with `kGlowTintsLight`, the light emits the material's emission times the light's colour.
-  /// Camera and mirror rays see the same product.
+  /// Camera rays and mirror reflections see the same product.
   kNoResponse,
 };
 
@@ -124,14 +124,15 @@ struct Light {
   float radius = 0.5f;          ///< radius of a disk, sphere or cylinder before `to_world`
   float length = 1;             ///< length of a cylinder along x before `to_world`
   float angle = 0.53f;          ///< apparent diameter of a distant light, degrees
-  /// UsdLux `normalize`: divide by the world-space area, or by the solid angle for distant lights.
+  /// UsdLux `normalize`: whether to divide `color` by the world-space area or, for distant lights,
+  /// by the solid angle.
   bool normalize = false;
   /// Texture of a rect (u to the right, v up as seen from the front) or a dome (latlong).
   uint32_t texture = kNoTexture;
   uint32_t group = 0;  ///< light group id that SceneBuilder::light_group() returned
   Shaping shaping;     ///< directional emission, for area lights and point lights
-  /// Factors of the light's contribution to the diffuse and the specular response of materials
-  /// (UsdLux; not physically based).
+  /// Factors of the diffuse and the specular response of materials to the light (UsdLux; not
+  /// physically based).
   float diffuse = 1, specular = 1;
   /// Ids that SceneBuilder::add_geometry_set() returned: the set of objects that the light
   /// illuminates, and the set of objects that cast shadows from it.
@@ -141,7 +142,7 @@ struct Light {
   uint32_t filter = kNoFilter;
   bool visible = true;  ///< whether camera and bounce rays can hit the light's shape
   /// Portals of a dome light: transforms from the unit square in the xy plane to the openings
-  /// towards which the dome is sampled. The -z side of a portal receives the light.
+  /// through which the dome is sampled. The -z side of a portal receives the light.
   std::vector<Affine> portals;
   /// Values of the parameters specific to the light's kind (LightKindInfo::own), if given.
   std::array<std::optional<float>, kMaxSpecificParameters> own;

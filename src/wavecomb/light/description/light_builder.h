@@ -19,7 +19,7 @@ struct MeshLightInstance {
   const Light* light;
   Affine to_world;  ///< transform of the mesh's group
   double area;      ///< total one-sided area of the triangles in world space
-  /// Whether light samples select the mesh; otherwise, only paths that hit the mesh sample its
+  /// Whether light samples can select the mesh. Otherwise, only paths that hit the mesh find its
   /// emission.
   bool is_sampled;
 };
@@ -36,7 +36,7 @@ struct EmissiveTriangle {
   float radiance[3] = {0, 0, 0};
   uint32_t mesh_light = kNoLight;  ///< index of the triangle's MeshLightInstance, or kNoLight
   /// Opacity of the triangle in [0, 1], which scales its sampled emission. If the opacity varies,
-  /// pass its expected value, which affects only light selection probabilities.
+  /// this is its expected value, which affects only light selection probabilities.
   float opacity = 1;
   bool opacity_varies = false;
   /// The expected luminance of the emission is luminance(radiance) * mean_scale. For a texture,
@@ -46,12 +46,12 @@ struct EmissiveTriangle {
 };
 
 /// All lights of a scene, packed for kernels. Light indices count infinite lights first, then
-/// lights with a shape and point lights (together `records`), then triangles; each of the three
-/// groups is in input order.
+/// lights with a shape and point lights (together `records`), then triangles; within each of the
+/// three groups, lights are in input order.
 struct LightSet {
   /// Records of all lights except triangles. The records from index `record_count` on belong to
-  /// mesh lights: they hold values that the triangles of a mesh light share, and light sampling
-  /// never selects them.
+  /// mesh lights. They hold values that the triangles of a mesh light share, and are never selected
+  /// by light sampling.
   std::vector<LightRecord> records;
   uint32_t record_count = 0;  ///< number of records, not counting records of mesh lights
   std::vector<TriangleLight> triangles;

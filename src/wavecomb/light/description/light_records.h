@@ -40,9 +40,9 @@ struct alignas(64) LightRecord {
   uint32_t distribution;
   uint32_t shaping;  ///< index into LightView::shapings, or kNoShaping
   float diffuse, specular;
-  /// Nonzero for lights that only light samples find. Light samples then have MIS weight 1, and
-  /// bounces that hit the light contribute nothing, except delta bounces. Lights whose shape rays
-  /// cannot hit have this flag, and lights whose shadows bounce rays cannot reproduce.
+  /// Nonzero for lights that only light samples find, such as lights whose shape rays cannot hit or
+  /// whose shadows bounce rays cannot reproduce. Light samples of these lights have MIS weight 1,
+  /// and bounces that hit them contribute nothing, except delta bounces.
   uint32_t sampled_only;
   uint32_t hidden;  ///< 1 means that rays cannot hit the shape of the light
   uint32_t light_link, shadow_link;
@@ -52,7 +52,7 @@ struct alignas(64) LightRecord {
   float length_u, length_v, inverse_u, inverse_v;
   uint32_t shadow;  ///< index into LightView::shadows, or kPlainShadow
   uint32_t filter;  ///< index into LightView::filters, or kNoFilter
-  /// Nonzero if no light paths start at this light, so that only camera paths sample it.
+  /// Nonzero if no light paths start at this light, so that only camera paths find it.
   uint32_t camera_only;
 };
 static_assert(sizeof(LightRecord) == 192);
@@ -123,17 +123,18 @@ struct IesRecord {
 /// Packed triangle of an emissive mesh, in world space; it emits from both sides. A scene may have
 /// millions of these records, which are read in random order, so each record fills one cache line.
 struct alignas(64) TriangleLight {
-  float p[3], u[3], v[3];  ///< vertex 0 and the edges from it
-  /// Radiance times opacity if both are constant. Otherwise three bit patterns: kEmission or
-  /// kOpacity, which states what varies; the material that determines it; and the index of its
-  /// TriangleUvs.
+  float p[3], u[3], v[3];  ///< vertex 0, and the edges that start there
+  /// Radiance times opacity if both are constant. Otherwise, three values that are not a colour:
+  /// kEmission or kOpacity, which states what varies, and the bit patterns of the material index
+  /// and of the index of the triangle's TriangleUvs.
   float radiance[3];
   float m[3];           ///< unit geometric normal times the triangle's area
   float selection_pdf;  ///< probability of selecting this triangle by power
-  /// Marks triangles for which the emission, and possibly the opacity, of the material varies.
+  /// Value of radiance[0] of triangles on which the material's emission, and possibly its opacity,
+  /// varies.
   static constexpr float kEmission = -1.f;
-  /// Marks triangles for which only the opacity of the material varies. The opacity scales the
-  /// radiance of a mesh light that ignores the material's emission.
+  /// Value of radiance[0] of triangles on which only the material's opacity varies. The opacity
+  /// scales the radiance of a mesh light that ignores the material's emission.
   static constexpr float kOpacity = -2.f;
   bool varies() const { return radiance[0] < 0; }
 };
@@ -179,9 +180,9 @@ struct Distribution2D {
 };
 
 /// Integer alias tables that map a random number k in [0, 2^24) to a light. Random numbers below
-/// `split` select a record, and all other numbers select a triangle. Looking up one of a few strong
-/// lights therefore does not read the table of millions of triangles. Each bin of a table covers
-/// 2^shift random numbers.
+/// `split` select a record, and all other numbers select a triangle. Therefore, the selection of
+/// one of a few strong lights does not access a table of millions of triangles. Each bin of a table
+/// covers 2^shift random numbers.
 struct PowerTable {
   /// Bins of the table for records and of the table for triangles. Each bin b covers 2^shift random
   /// numbers r. Numbers r < bins[b] mod 2^shift select light b of the group; all other numbers
@@ -217,8 +218,8 @@ struct alignas(64) LightTreeNode {
 static_assert(sizeof(LightTreeNode) == 64);
 
 inline constexpr uint32_t kTreeLeaf = 0x80000000u;
-/// Maximum depth of a light in the tree, since a trail (LightTreeView::trails) has one bit for each
-/// node above the light.
+/// Maximum depth of a light in the tree. The limit exists because a trail (LightTreeView::trails)
+/// has one bit for each node above the light.
 inline constexpr uint32_t kMaxTreeDepth = 31;
 
 /// Light tree (light/sampling/tree_choice.h). Random numbers k in [0, 2^24) below `numbers` select
@@ -233,7 +234,7 @@ struct LightTreeView {
   uint32_t root = kNoLight;
   uint32_t numbers = 0;
   /// Effective number of lights: 1 / (sum over lights of the squared fraction of the tree's power),
-  /// which is the number of lights if all have equal power. 0 if no light of the tree emits.
+  /// which is the number of lights if all have equal power, or 0 if no light of the tree emits.
   float effective_lights = 0;
 };
 
@@ -259,8 +260,8 @@ struct LightView {
   const TriangleLight* triangles = nullptr;
   const TriangleUvs* triangle_uvs = nullptr;
   PowerTable power_table;
-  /// Selection probability of each light if `power_table` was calibrated; null if the probabilities
-  /// in the records apply.
+  /// Selection probability of each light if `power_table` was calibrated. Null means that the
+  /// probabilities in the records are valid.
   const float* selection_pdf = nullptr;
   LightTreeView tree;
   bool by_tree = false;  ///< whether to select lights by `tree` instead of `power_table`
@@ -289,9 +290,9 @@ struct LightView {
   LinkView links;
   /// Textures of lights, and materials of triangles whose emission or opacity varies.
   MaterialView materials;
-  /// Bounding sphere of all surfaces. Light paths from infinite lights are sent through this
-  /// sphere. They start at the distance `reach` in front of its centre, outside all light shapes.
-  /// Radius 0 means that no light paths start.
+  /// Bounding sphere of all surfaces. Light paths from infinite lights pass through this sphere.
+  /// They start at the distance `reach` from its centre, outside of all light shapes. Radius 0
+  /// means that there are no light paths.
   float centre[3] = {0, 0, 0};
   float radius = 0, reach = 0;
   bool emits_paths() const { return radius > 0; }

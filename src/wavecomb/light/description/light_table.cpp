@@ -94,8 +94,8 @@ LightParameter in(LightGroup group, LightParameter p) {
   return p;
 }
 /// The function `all` marks a table row as a parameter of all lights, and the function `with` as a
-/// parameter of the lights with a trait. Rows made by the function `in` are parameters of the light
-/// kinds that list their names.
+/// parameter of the lights with a trait. The function `in` makes rows for parameters of individual
+/// light kinds, which list the names of these parameters.
 LightParameter all(LightGroup group, LightParameter p) {
   p.is_common = true;
   return in(group, std::move(p));
@@ -140,26 +140,26 @@ std::vector<LightParameter> shape_rows() {
                           10)),
       with(kSized, kEmission,
            row<&L::normalize>("normalize", "normalize", "normalize",
-                              "Divides the light's radiance by its world-space area, or for a "
-                              "distant light by UsdLux's sizeFactor.")),
+                              "Divides the light's radiance by its world-space area, or by "
+                              "UsdLux's sizeFactor for a distant light.")),
       with(kTextured, kEmission,
            id(row<&L::texture>("texture", "texture", "texture:file",
-                               "Texture that multiplies the light's colour: on a rect with u to "
-                               "the right and v up as seen from the front, on a dome as latlong."),
+                               "Texture that multiplies the light's colour; on a rect light, u "
+                               "points right and v up, seen from the front; a dome uses latlong."),
               LightRefers::kTexture)),
       with(kHasTransform, kEmission,
            id(row<&L::group>("group", "group", "",
-                             "Name of the light group of this light, for AOVs of light groups."),
+                             "Name of the light group whose AOV receives this light."),
               LightRefers::kGroup)),
       all(kResponse,
           positive(row<&L::diffuse>(
                        "diffuse", "diffuse", "diffuse",
-                       "Factor of the light's contribution to the diffuse response of materials."),
+                       "Scale of the light's contribution to the diffuse response of materials."),
                    2)),
       all(kResponse,
           positive(row<&L::specular>(
                        "specular", "specular", "specular",
-                       "Factor of the light's contribution to the specular response of materials."),
+                       "Scale of the light's contribution to the specular response of materials."),
                    2)),
   };
 }
@@ -189,7 +189,7 @@ std::vector<LightParameter> shaping_rows() {
       with(kShaped, kShaping,
            row<kS, &S::cone_softness>(
                "cone_softness", "cone softness", "shaping:cone:softness",
-               "Fraction of the light's cone over which emission falls to 0.")),
+               "Outer fraction of the light's cone over which emission falls to 0.")),
       with(kShaped, kShaping,
            id(row<kS, &S::ies>(
                   "ies", "IES profile", "shaping:ies:file",
@@ -233,15 +233,15 @@ std::vector<LightParameter> shadow_rows() {
                                          "Maximum world-space distance from an occluder to the "
                                          "surface it shadows; less than 0 means no limit."),
                                      10)),
-      all(kResponse,
-          with_slider_max(row<kH, &H::falloff>("shadow_falloff", "shadow falloff", "shadow:falloff",
-                                               "World-space length before the shadow distance over "
-                                               "which shadows fade; 0 or less means no fade."),
-                          10)),
+      all(kResponse, with_slider_max(row<kH, &H::falloff>(
+                                         "shadow_falloff", "shadow falloff", "shadow:falloff",
+                                         "World-space length over which shadows fade, ending at "
+                                         "the shadow distance; 0 or less means no fade."),
+                                     10)),
       all(kResponse,
           positive(row<kH, &H::gamma>("shadow_falloff_gamma", "shadow falloff gamma",
                                       "shadow:falloffGamma",
-                                      "Exponent of the shadow strength where shadows fade."),
+                                      "Exponent applied to the strength of fading shadows."),
                    4)),
   };
 }
@@ -261,14 +261,13 @@ std::vector<LightParameter> other_rows() {
            row<&L::visible>("visible", "visible", "",
                             "Whether camera and bounce rays can hit the light's shape.")),
       with(kHasTransform, kShape,
-           row<&L::motion>(
-               "motion", "motion", "",
-               "Transforms of a moving light at k >= 2 equally spaced shutter times, "
-               "(k, 4, 4). The transform at the middle of the shutter defines its size.")),
+           row<&L::motion>("motion", "motion", "",
+                           "Transforms of a moving light at k >= 2 equally spaced shutter times, "
+                           "(k, 4, 4). The transform at mid-shutter defines the light's size.")),
       in(kShape,
          row<&L::portals>("portals", "portals", "",
-                          "Transforms (k, 4, 4) of the unit square in the xy plane to k openings "
-                          "towards which a dome is sampled; it lights their -z sides.")),
+                          "Transforms (k, 4, 4) from the unit square in the xy plane to k openings "
+                          "towards which a dome is sampled; their -z sides receive the light.")),
       in(kEmission,
          choice(
              row<&L::sync>("material_sync", "material sync", "",

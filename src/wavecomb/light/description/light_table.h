@@ -77,8 +77,8 @@ struct LightParameter {
   LightValue standard() const { return read(Light{}); }
 };
 
-/// Returns all light parameters except kind, name and to_world, in the order in which scene
-/// fingerprints hash them. Parameters specific to one kind come last.
+/// Returns all light parameters except kind, name and to_world. Scene fingerprints hash them in
+/// this order. Parameters specific to one kind come last.
 std::span<const LightParameter> light_table();
 /// Returns the table row of a light parameter, or null for an unknown name.
 const LightParameter* find_light_parameter(std::string_view name);

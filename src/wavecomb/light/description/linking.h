@@ -14,7 +14,7 @@ namespace wavecomb {
 
 class ObjectNames;
 
-/// Returns a path without the numbers of point instances: "/Forest/Leaves" for
+/// Returns a path without the indices of point instances: "/Forest/Leaves" for
 /// "/Forest[12]/Leaves".
 std::string without_numbers(std::string_view path);
 
@@ -34,7 +34,7 @@ struct GeometrySet {
   bool contains(std::string_view path) const;
 };
 
-/// Membership of all objects in the geometry sets. Objects that belong to the same sets form a
+/// Membership of objects in the geometry sets. All objects that belong to the same sets form a
 /// class.
 struct SceneLinks {
   SceneLinks(const ObjectNames& names, std::span<const GeometrySet> sets);

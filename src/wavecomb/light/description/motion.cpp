@@ -62,8 +62,8 @@ bool rotation_between(const Affine& from, const Affine& to, Matrix& x) {
   return det > 0.5;  // Reject reflections, which are not rotations.
 }
 
-/// Writes the unit quaternion of a rotation, with the sign for which it is closer to the quaternion
-/// `before`.
+/// Writes the unit quaternion of a rotation. Of the two possible signs, chooses the one that is
+/// closer to the quaternion `before`.
 void store_rotation(const Matrix& m, const float (&before)[4], float (&to)[4]) {
   double q[4];
   const double trace = m[0][0] + m[1][1] + m[2][2];
@@ -202,8 +202,8 @@ BoundingSphere swept_bounds(const LightMotion& motion, std::span<const LightStep
     all.centre[i] = 0.5 * (lo[i] + hi[i]);
     reach += (hi[i] - all.centre[i]) * (hi[i] - all.centre[i]);
   }
-  // Between two tested poses, the light's centre is closer to each of these poses than their
-  // distance, which is at most `opening`.
+  // Between two tested poses, the distance of the light's centre from each of the two is at most
+  // the distance between them, which is at most `opening`.
   all.radius = (at_rest.radius + std::sqrt(reach) + opening) * (1 + 1e-5);
   return all;
 }

@@ -22,10 +22,10 @@ struct LightCluster;
 /// Adds the motion of `lights` to `set`, which already contains their records.
 void add_motions(LightSet& set, std::span<const Light> lights);
 
-/// Pose of a light at a time, in double precision; LightPose (light/sampling/moving.h) is its
-/// counterpart for kernels.
+/// Pose of a light at a given time, in double precision. LightPose (light/sampling/moving.h) is the
+/// corresponding type in kernels.
 struct PreciseLightPose {
-  double x[3], y[3], z[3];  ///< directions at the given time of the light's mid-shutter axes
+  double x[3], y[3], z[3];  ///< directions of the light's mid-shutter axes at the given time
   double position[3], origin[3];
 
   PreciseLightPose(const LightMotion& motion, std::span<const LightStep> steps, double time);
@@ -39,7 +39,8 @@ struct BoundingSphere {
   double centre[3];
   double radius;
 };
-/// Returns a ball that contains all positions of the ball `at_rest`, which moves with a light.
+/// Returns a ball that contains the ball `at_rest` in all its positions while it moves with a
+/// light.
 BoundingSphere swept_bounds(const LightMotion& motion, std::span<const LightStep> steps,
                             const BoundingSphere& at_rest);
 /// Returns bounds of a light over its whole motion, from its bounds at mid-shutter.

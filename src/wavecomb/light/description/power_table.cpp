@@ -12,10 +12,10 @@ namespace {
 
 constexpr size_t kBand = size_t{1} << 16;
 
-/// Fills the alias bins of one group: light i gets numbers[i] random numbers, where each bin has
-/// 2^shift random numbers and the sum of `numbers` fills all bins. Processes bins from the last to
-/// the first. A bin that is not full takes its missing random numbers from the last bin with a
-/// surplus. If the last bin then has a deficit, it is processed next.
+/// Fills the alias bins of one group, so that light i gets numbers[i] random numbers. Each bin has
+/// 2^shift random numbers, and the sum of `numbers` must fill all bins. Processes bins from the
+/// last to the first. A bin that is not full takes its missing random numbers from the last bin
+/// with a surplus. If the last bin then has a deficit, it is processed next.
 void fill_bins(std::span<const uint32_t> numbers, uint32_t shift, std::span<uint32_t> bins) {
   const uint32_t size = 1u << shift;
   const auto number_of = [&](size_t bin) { return bin < numbers.size() ? numbers[bin] : 0u; };
@@ -44,7 +44,7 @@ void count_numbers(std::span<const double> weights, std::span<double> shares, si
   double running = 0;
   for (double& share : shares) share = running += share;
   const double all = running;
-  // Round the running sum, so that the total is exact.
+  // Round running sums instead of single shares, so that the total is exact.
   const auto up_to = [&](double part) {
     return static_cast<uint32_t>(
         std::nearbyint(std::min(1.0, part / all) * static_cast<double>(free)));
@@ -105,8 +105,8 @@ PowerTable build_power_table(std::span<const double> weights, size_t first_trian
   });
 
   // The number of random numbers of each group is a multiple of the bin size, and each group has at
-  // least one bin per light. A few large bins stay in the cache, and 1024 bins for all random
-  // numbers give enough resolution.
+  // least one bin per light. Few, large bins are preferred because they stay in the cache; 1024
+  // bins for all random numbers give enough resolution.
   const auto least = [&](size_t g, uint32_t shift) {
     const uint64_t units = (groups[g].size() + (size_t{1} << shift) - 1) >> shift;
     return emitting_of[g] > 0 ? units << shift : 0;

@@ -96,7 +96,7 @@ EmissiveTriangle emissive_triangle(const SceneGeometry& geometry, const SceneMat
 SceneLights::SceneLights(std::vector<Light> all, const SceneGeometry& geometry,
                          const SceneMaterials& materials, const SceneLights* before)
     : lights(std::move(all)) {
-  // Each triangle of a mesh whose material emits becomes a light.
+  // Each triangle of a mesh that emits becomes a light.
   std::vector<EmissiveMesh> sources;
   size_t triangle_count = 0;
   const auto emits = [&](uint32_t material) {
@@ -149,8 +149,8 @@ SceneLights::SceneLights(std::vector<Light> all, const SceneGeometry& geometry,
                       .mesh_lights = light_instances,
                       .tree_time = TreeTime::kWhenChosen,
                       .filters = geometry.filters});
-  // Convert the entries of `emissive` and `mesh_lights`, which count from the first triangle and
-  // the first mesh light, to light indices.
+  // Convert the entries of `emissive` and `mesh_lights` to light indices. Until here, they count
+  // from the first triangle and from the first mesh light.
   for (std::vector<uint32_t>* table : {&emissive, &mesh_lights})
     for (uint32_t& entry : *table)
       if (entry != kNoLight) entry += set.first_triangle();

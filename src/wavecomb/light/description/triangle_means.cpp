@@ -13,7 +13,7 @@ namespace {
 /// would ignore triangles with an estimate of 0.
 constexpr float kMinOpacity = 1.f / 16;
 
-/// Returns the mean of the values that a material input reads from a texture.
+/// Returns the mean value of a textured material input over the whole texture.
 Vec3<float> mean_texture(const SceneGeometry& geometry, const TextureUse& use) {
   const float* mean = geometry.textures[use.texture]->mean();
   const auto value = [&](uint32_t c) {
@@ -39,7 +39,7 @@ Vec3<float> mean_graph(const SceneGeometry& geometry, const SceneMaterials& mate
     return Vec3<float>(p[0], p[1], p[2]);
   };
   // Evaluate the graph at the centres of four sub-triangles of equal area, with texture footprints
-  // of about their size.
+  // of about the size of a sub-triangle.
   constexpr float kPoints[4][2] = {
       {1.f / 3, 1.f / 3}, {1.f / 6, 1.f / 6}, {2.f / 3, 1.f / 6}, {1.f / 6, 2.f / 3}};
   const float width =

@@ -6,20 +6,21 @@
 
 namespace wavecomb {
 
-/// Returns whether light sampling can aim at the emission of a material. It cannot if the
-/// material's graph reads inputs that are known only when a path hits the surface; only paths that
+/// Returns whether light sampling can aim at the emission of a material. The result is false if the
+/// material's graph reads inputs that are known only when a path hits the surface. Only paths that
 /// hit the surface find such emission.
 bool can_aim_at(const Material& material, const GraphSet& graphs);
 
-/// Sets the radiance of a triangle with known corners to the emission of `material`: exact if it is
-/// constant, otherwise an estimate of its mean (from the mean of the whole texture, or from a few
-/// points of a graph). Sets the radiance to 0 if light sampling cannot aim at the material.
+/// Sets the radiance of a triangle, whose corners must be set, to the emission of `material` if the
+/// emission is constant, otherwise to an estimate of its mean (from the mean of the whole texture,
+/// or from evaluating a graph at a few points). Sets the radiance to 0 if light sampling cannot aim
+/// at the material.
 void set_mean_emission(const SceneGeometry& geometry, const SceneMaterials& materials,
                        const Material& material, EmissiveTriangle& triangle);
 
 /// Sets the opacity of a triangle to the opacity of `material` if this opacity is constant,
-/// otherwise to an estimate of its mean that is never 0. Sets the triangle's opacity to 1 if the
-/// material does not use opacity as presence.
+/// otherwise to a nonzero estimate of its mean. Sets the triangle's opacity to 1 if the material
+/// does not use opacity as presence.
 void set_mean_opacity(const SceneGeometry& geometry, const SceneMaterials& materials,
                       const Material& material, EmissiveTriangle& triangle);
 

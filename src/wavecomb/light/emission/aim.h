@@ -46,7 +46,7 @@ template <typename F>
 }
 
 /// Returns the factor g by which aiming changes the emission density of a finite light, for paths
-/// from the point `p` along d. `own` is the density of the direction d without aiming.
+/// from the point `p` along d. `own` is the density of d without aiming.
 template <typename F>
 [[gnu::noinline]] F aim_density_finite(const LightView& view, const Vec3<F>& p, const Vec3<F>& d,
                                        const F& own) {

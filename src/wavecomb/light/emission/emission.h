@@ -2,8 +2,8 @@
 /// Light paths: sampling of a light, a point on it and a direction, and the densities that both
 /// ends of a path need for multiple importance sampling (docs/light-paths.md).
 ///
-/// Two kinds of lights emit no light paths, and only camera paths find them: lights with properties
-/// that light paths do not support, such as links, multipliers, decay or motion
+/// Two kinds of lights emit no light paths, so that only camera paths find their light: lights with
+/// properties that light paths do not support, such as links, multipliers, decay or motion
 /// (LightRecord::camera_only), and mesh lights whose visible emission differs from the light that
 /// they cast. The function bodies are in emission.inl.
 #pragma once
@@ -31,11 +31,11 @@ struct EmissionNumbers {
   F light, u, v, s, t, aim;
 };
 
-/// Density with which camera paths sample a light from the first surface that a light path hits.
-/// `density` is the solid angle density of a light sample. For a point light, `density` is the
-/// probability of selecting the light times the squared distance d^2, since 1 / d^2 replaces the
-/// solid angle. For a distant light without an angle, `density` is the probability of selecting the
-/// light.
+/// Density with which camera paths sample a light from the point where a light path first hits a
+/// surface. `density` is the solid angle density of a light sample. For a point light, `density` is
+/// the probability of selecting the light times the squared distance d^2, since 1 / d^2 replaces
+/// the solid angle. For a distant light without an angle, `density` is the probability of selecting
+/// the light.
 template <typename F>
 struct CameraPathDensity {
   F density;
@@ -54,8 +54,8 @@ template <typename F>
 F emission_density(const LightView& view, const UInt<F>& light, const Vec3<F>& from,
                    const Vec3<F>& dir, const F& t, const Mask<F>& wanted);
 
-/// Returns the density with which camera paths at `from` sample `light`, which emitted a path that
-/// arrived along -dir over the distance t.
+/// Returns the density with which camera paths at `from` sample `light`, for a light path that
+/// `light` emitted and that arrived at `from` along -dir over the distance t.
 template <typename F>
 CameraPathDensity<F> camera_path_density(const LightView& view, const UInt<F>& light,
                                          const LightReceiver<F>& from, const Vec3<F>& dir,

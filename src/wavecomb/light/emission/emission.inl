@@ -37,8 +37,8 @@ inline F emission_selection_pdf(const LightView& view, const UInt<F>& light, con
   return view.selection_pdf ? gather<F>(view.selection_pdf, light, active) : recorded;
 }
 
-/// Returns an upper bound of the terms p, u and v that add up to a point on a light. The point's
-/// rounding error is proportional to this bound.
+/// Returns an upper bound of the magnitudes of the terms in p, u and v whose sum is a point on a
+/// light. The point's rounding error is proportional to this bound.
 template <typename F>
 inline F size_of_terms(const Vec3<F>& p, const Vec3<F>& u, const Vec3<F>& v) {
   const auto most = [](const Vec3<F>& a) { return max(max(abs(a.x), abs(a.y)), abs(a.z)); };

@@ -36,7 +36,7 @@ ShadowRecord make_shadow(const ShadowAttributes& attributes) {
   ShadowRecord r{};
   put(r.color, to_double(attributes.color));
   r.distance = attributes.distance < 0 ? kFarAway : attributes.distance;
-  // Limit the falloff zone, so that it does not extend beyond the shaded surface.
+  // Limit the falloff range, so that it does not extend beyond the shaded surface.
   r.falloff =
       attributes.distance < 0 ? 0.f : std::clamp(attributes.falloff, 0.f, attributes.distance);
   r.inverse_gamma = 1 / std::max(attributes.gamma, 1e-3f);

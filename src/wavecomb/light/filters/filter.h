@@ -87,8 +87,8 @@ struct FilterReader : RecordReader<F> {
   }
 };
 
-/// Returns the radiance after filter `filter` and all filters chained to it. kNoFilter leaves the
-/// radiance unchanged.
+/// Returns the radiance that passes filter `filter` and all filters chained to it. For kNoFilter,
+/// the radiance is unchanged.
 template <typename F>
 [[gnu::noinline]] Color<F> filtered(const LightView& view, const UInt<F>& filter,
                                     const LeavingLight<F>& light, const Color<F>& radiance,

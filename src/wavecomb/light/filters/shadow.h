@@ -6,15 +6,15 @@
 /// greater. Shadow rays end at L = D - f u^(1 / gamma) with u uniform in [0, 1), so that P(L > t) =
 /// s(t), and the expected shadow has the strength s(t).
 ///
-/// Bounces that hit a light cannot reproduce such shadows, so only light samples find lights with
-/// shadow attributes.
+/// Bounces that hit a light cannot reproduce such shadows. The light of lights with shadow
+/// attributes is therefore found only by light samples.
 #pragma once
 
 #include "wavecomb/light/records/record_reader.h"
 
 namespace wavecomb {
 
-/// Length of a light's shadow rays, and the fraction of the light that remains in shadow.
+/// Length of a light's shadow rays, and fraction of the light that reaches shadowed points.
 template <typename F>
 struct ShadowExtent {
   F distance;

@@ -14,8 +14,8 @@
 
 namespace wavecomb::detail {
 
-/// Returns the index, at most n - 2, of the last of n ascending numbers that is not greater than x.
-/// `first` is the index of the first number in `numbers`.
+/// Returns the index of the last of n ascending numbers that is not greater than x, but at most n -
+/// 2. `first` is the index of the first number in `numbers`.
 template <typename F>
 inline UInt<F> interval_below(const float* numbers, const UInt<F>& first, const UInt<F>& n,
                               const F& x, const Mask<F>& active) {

@@ -6,8 +6,8 @@
 
 namespace wavecomb::detail {
 
-/// Cylinder as seen from a point outside, in the orthonormal frame of its axis a, the unit vector e
-/// that points from the point perpendicularly to the axis, and f. A direction
+/// Cylinder as seen from a point outside. The orthonormal frame consists of the cylinder's axis a,
+/// the unit vector e from the point perpendicularly towards the axis, and f. A direction
 ///   cos(gamma) (cos(alpha) e + sin(alpha) f) + sin(gamma) a
 /// hits the near side of the infinite cylinder at the perpendicular distance s(alpha). For a given
 /// alpha, the visible part of the finite cylinder is an interval of sin(gamma). Directions that are
@@ -57,8 +57,8 @@ template <typename F>
 struct CylinderSpan {
   F begin, size;     ///< z_0 / h_0, and z_1 / h_1 - z_0 / h_0
   F rest;            ///< 1 - |begin|
-  Mask<F> one_side;  ///< whether both ends of the cylinder are ahead of the point, or both behind
-                     ///< it
+  Mask<F> one_side;  ///< whether both ends of the cylinder lie on the same side of the point along
+                     ///< the axis
 };
 /// Computes the visible interval without cancellation. If both ends are on one side, the numerator
 /// of the size, z_1 h_0 - z_0 h_1, equals s^2 (z_1^2 - z_0^2) / (z_1 h_0 + z_0 h_1), and the member
@@ -83,9 +83,9 @@ template <typename F>
 struct CylinderSlope {
   F sin_gamma, cos_gamma;
 };
-/// Returns sin(gamma) and cos(gamma) at the fraction v of the span. Far along the cylinder, all
-/// sines are within a millionth of 1. Since the hit distance depends on the cosine, the difference
-/// of the sine from 1 is computed separately.
+/// Returns sin(gamma) and cos(gamma) at the fraction v of the visible interval. Far along the
+/// cylinder, all sines are within a millionth of 1. Since the hit distance depends on the cosine,
+/// the difference of the sine from 1 is computed separately.
 template <typename F>
 inline CylinderSlope<F> cylinder_slope(const CylinderSpan<F>& span, const F& v) {
   const F step = v * span.size;

@@ -8,8 +8,8 @@ namespace {
 
 using namespace record_builder;
 
-/// Sets the world axes of the dome from the rotation and mirroring of its transform, without its
-/// scale. If the axes are not orthogonal, the pole (y axis) keeps its direction.
+/// Sets the world axes of the dome. The rotation and mirroring of its transform are used, but not
+/// the scale. If the axes are not orthogonal, the pole (y axis) keeps its direction.
 void set_axes(LightRecord& record, const Affine& m) {
   const Double3 y = unit(to_double(m.axis(1)));
   Double3 z = to_double(m.axis(2));

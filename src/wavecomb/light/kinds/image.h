@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Sampling of image points with a Distribution2D, and the density of these points, for all lights
-/// with an image that maps to the unit square.
+/// Sampling of image points with a Distribution2D, and the density of these points. The functions
+/// are used by all lights with an image over the unit square.
 ///
 /// The image coordinate x equals s and points to the right; y points down from the top row, so y =
 /// 1 - t.
@@ -46,7 +46,8 @@ inline uint32_t last_at_most(const Distribution2D::Line& line, uint32_t n, uint1
   return std::min<uint32_t>(at_most, n) - 1;
 }
 
-/// Returns the interval of a row of n intervals whose counts include x in [0, kCounts).
+/// Returns the interval to which the sample value x in [0, kCounts) belongs, in a row of n
+/// intervals.
 template <typename F>
 inline Interval<F> find_interval(const Distribution2D& d, const UInt<F>& row, uint32_t n,
                                  const UInt<F>& x, const Mask<F>& active) {
@@ -69,9 +70,8 @@ inline Interval<F> find_interval(const Distribution2D& d, const UInt<F>& row, ui
   return {load<U>(index.value), load<U>(begin.value), load<U>(count.value)};
 }
 
-/// Returns the density over the unit square in a cell, from the counts of its row and its column.
-/// For a row or a column, the density is count / 65536 * (number of intervals); the result is the
-/// product of the two densities.
+/// Returns the density over the unit square in a cell, which is the product of the densities of its
+/// row and its column. Each of these is count / 65536 * (number of intervals).
 template <typename F>
 inline F image_pdf(const Distribution2D& d, const UInt<F>& row_count, const UInt<F>& column_count) {
   const float scale = static_cast<float>(d.width) * static_cast<float>(d.height) * 0x1p-32f;

@@ -19,8 +19,8 @@ std::span<const LightKindInfo> light_kinds() {
 
 namespace {
 
-/// Returns whether a light filter, or a filter chained to it, depends on the distance that light
-/// travels, which is unknown when a light path starts.
+/// Returns whether a light filter, or a filter chained to it, depends on the distance that the
+/// light travels. This distance is unknown when a light path starts.
 bool fades(std::span<const LightFilter> filters, uint32_t filter) {
   for (; filter != kNoFilter; filter = filters[filter].next)
     if (filters[filter].fades()) return true;

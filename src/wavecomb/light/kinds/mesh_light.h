@@ -51,7 +51,8 @@ template <typename F>
 struct MeshLightRay {
   Vec3<F> dir;
   UInt<F> link;      ///< light linking class of the surface at which the ray starts
-  Mask<F> is_delta;  ///< delta bounces and camera rays, which light sampling cannot produce
+  Mask<F> is_delta;  ///< whether the ray is a camera ray or a delta bounce, which light sampling
+                     ///< cannot produce
   bool from_camera;
   Color<F> diffuse;  ///< diffuse fraction of the bounce for each colour
 };

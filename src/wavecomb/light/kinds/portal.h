@@ -7,9 +7,9 @@
 ///     p = a (number of portals it passes) / (sum of solid angles) + (1 - a) p_image,
 /// so that light from outside the portals is also sampled. Let w be the solid angle of the portals,
 /// and i the effective solid angle of the image (PortalGroup::image_solid_angle). Then a = i / (i +
-/// w), clamped, since the technique with the smaller solid angle samples the light better. Points
-/// that see no portal from the side at which light enters the room, or only portals smaller than
-/// kMinRectSolidAngle, use the image alone.
+/// w), clamped to a range, since the technique with the smaller solid angle samples the light
+/// better. Only the image is sampled at points that see no portal from the room's side, or only
+/// portals smaller than kMinRectSolidAngle.
 #pragma once
 
 #include "wavecomb/light/kinds/rect.h"
@@ -58,8 +58,8 @@ class Portals {
     return wi;
   }
 
-  /// Returns the density of the mixture of portal and image sampling. `through` marks lanes whose
-  /// direction was sampled by `sample()`.
+  /// Returns the density of the mixture of portal and image sampling. `through` marks the lanes in
+  /// which `sample()` sampled the direction.
   F pdf(const Vec3<F>& wi, const F& image_pdf, const Mask<F>& through) const {
     F hits(0.f);
     for_each([&](const SphericalRect<F>& r, const LightReader<F>&) {

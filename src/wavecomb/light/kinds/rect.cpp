@@ -8,8 +8,8 @@ namespace {
 
 using namespace record_builder;
 
-/// Images whose distribution has at least this spread are sampled uniformly, which increases noise
-/// only slightly.
+/// A rect light whose image distribution has at least this spread is sampled uniformly, which
+/// increases noise only slightly.
 constexpr float kUniformSpread = 0.9f;
 
 /// Adds the sampling distribution of the light's image, and sets the power from the image's mean.

@@ -9,9 +9,10 @@
 /// where p_image is the image density over the unit square, A the area, d the distance, cos the
 /// cosine at the light, and p_even the density without an image. Let i be the effective fraction of
 /// the image that emits light (Distribution2D::spread), and g the fraction of the rectangle that
-/// dominates its solid angle from the point, which is 1 if all of it is equally close. Then a = g /
-/// (g + i), clamped, since the technique with the smaller fraction samples the light better: the
-/// image from far away, and the solid angle nearby.
+/// makes up most of its solid angle as seen from the point. The fraction g is 1 if all parts of the
+/// rectangle are equally close. Then a = g / (g + i), clamped to a range, since the technique with
+/// the smaller fraction samples the light better: the image from far away, and the solid angle
+/// nearby.
 #pragma once
 
 #include "wavecomb/light/kinds/image.h"
@@ -34,8 +35,8 @@ inline Color<F> rect_radiance(const LightReader<F>& light, const TextureView* te
   return select<F>(textured, color * not_negative(image), color);
 }
 
-/// Smallest solid angle for solid angle sampling. For smaller solid angles, area sampling is as
-/// good, and computed solid angles lose precision.
+/// Smallest solid angle for solid angle sampling. Below it, area sampling is equally good, and
+/// computed solid angles are imprecise.
 inline constexpr float kMinRectSolidAngle = 2e-3f;
 
 /// Rectangle as seen from a point (C. Urena, M. Fajardo, A. King, "An Area-Preserving

@@ -82,8 +82,8 @@ inline Color<F> triangle_radiance(const TriangleReader<F>& light, const LightVie
   const Mask<F> varies = active & (light.radiance.x < 0.f);
   if (none(varies)) [[likely]]
     return light.radiance;
-  // Copy the arguments of the call. The original values, which triangles of constant radiance use,
-  // can then stay in registers.
+  // Pass copies to the call, so that the original values, which triangles of constant radiance use,
+  // can stay in registers.
   const UInt<F> material = float_bits<F>(light.radiance.y), index = float_bits<F>(light.radiance.z);
   const Vec2<F> at = b;
   const Vec3<F> point = q;

@@ -78,14 +78,15 @@ void finish_area(LightBuild& out, const Light& light, double area);
 void finish_flat(LightBuild& out, const Light& light, const Double3& u, const Double3& v,
                  double area_factor);
 
-/// Returns the sampling distribution for the texture and radiance of `light`: the distribution in
-/// context.before if it has one, otherwise the result of `build`.
+/// Returns the sampling distribution for the texture and radiance of `light`: the distribution of a
+/// light in context.before that has the same kind, texture and radiance, otherwise the result of
+/// `build`.
 Distribution2D density_of(const LightRecord& light, const LightBuildContext& context,
                           Distribution2D (*build)(const TextureView&, const Vec3<float>&));
 
 /// Adds shaping to a light, and scales the light's power by the fraction of light that the shaping
-/// transmits. The fraction is the product of the means of all shaping attributes over directions,
-/// as if they were independent.
+/// transmits. This fraction is estimated as the product of the means of all shaping attributes over
+/// directions, as if the attributes were independent.
 void add_shaping(LightBuild& out, const Light& light, LightBuildContext& context);
 
 /// Returns the packed shadow attributes of a light.

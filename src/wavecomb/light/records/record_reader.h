@@ -39,9 +39,9 @@ struct LightReader : RecordReader<F> {
   UInt<F> shaping() const { return (*this)[&LightRecord::shaping]; }
 };
 
-/// Returns the index of the record with the light linking and the multipliers of light `light`: the
-/// light's record or, for a triangle, the record of its mesh light. Returns kNoLight for triangles
-/// that are not part of a mesh light.
+/// Returns the index of the record that holds the light linking and the multipliers of light
+/// `light`. This is the light's record or, for a triangle, the record of its mesh light. Returns
+/// kNoLight for triangles that are not part of a mesh light.
 template <typename F>
 inline UInt<F> record_of(const LightView& view, const UInt<F>& light, const Mask<F>& active) {
   using U = UInt<F>;

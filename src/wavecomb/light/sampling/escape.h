@@ -35,7 +35,8 @@ template <typename F>
 struct EscapedRay {
   Vec3<F> from, dir;
   F bsdf_pdf{0.f};          ///< density of the bounce, per sr
-  Mask<F> is_delta{false};  ///< delta bounce or camera ray, which light sampling cannot produce
+  Mask<F> is_delta{false};  ///< whether the ray is a camera ray or a delta bounce, which light
+                            ///< sampling cannot produce
   bool from_camera = false;
   UInt<F> link{0u};          ///< light linking class of the surface at which the ray starts
   F ratio{0.f};              ///< PathState::ratio, for MIS with light paths
@@ -73,9 +74,9 @@ inline Color<F> infinite_light_radiance(const LightView& view, uint32_t light,
   return hit.radiance * weight;
 }
 
-/// Returns the sum over all infinite lights of radiance times MIS weight for an escaped ray. The
-/// MIS weight is the balance heuristic of bounce density and light sampling density, or 1 for delta
-/// bounces and camera rays.
+/// Returns the radiance that a ray which leaves the scene receives from all infinite lights,
+/// weighted for MIS. The MIS weight is the balance heuristic of bounce density and light sampling
+/// density, or 1 for delta bounces and camera rays.
 template <typename F>
 inline Color<F> escaped_radiance(const LightView& view, const EscapedRay<F>& ray,
                                  const Mask<F>& active) {

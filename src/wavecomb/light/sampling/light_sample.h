@@ -2,11 +2,11 @@
 /// Light sampling: selection of a light, sampling of a point on the light, and the densities of
 /// both.
 ///
-/// The direct light at p is estimated by f(wi) |cos| * LightSample::weight * MIS weight. If a
-/// bounce hits a light, which is the other MIS technique, light_hit(), triangle_light_pdf() and
-/// escaped_radiance() (escape.h) compute the density of sample_light() for the same direction. The
-/// function bodies are in light_sample.inl; the translation units of shared_kernels.h instantiate
-/// them.
+/// The direct light at p is estimated by f(wi) |cos| * LightSample::weight * MIS weight. The other
+/// MIS technique is a bounce that hits a light. For its direction, light_hit(),
+/// triangle_light_pdf() and escaped_radiance() (escape.h) compute the density of sample_light().
+/// The function bodies are in light_sample.inl; the translation units of shared_kernels.h
+/// instantiate them.
 #pragma once
 
 #include "wavecomb/core/vec.h"
@@ -58,9 +58,9 @@ struct LightHit {
   F pdf;  ///< density of sample_light() for the ray's direction; 0 for delta lights
 };
 
-/// Returns the radiance and sampling density of light `light` for the ray from.p + t along, which
-/// hit the light's shape at distance t. Returns 0 for light kinds without a shape and for inactive
-/// lanes.
+/// Returns the radiance and sampling density of light `light` for the ray from `from.p` along
+/// `along`, which hit the light's shape at distance t. Returns 0 for light kinds without a shape
+/// and for inactive lanes.
 template <typename F>
 LightHit<F> light_hit(const LightView& view, const UInt<F>& light, const LightReceiver<F>& from,
                       const Vec3<F>& along, const F& t, const Mask<F>& hit_lanes);
@@ -71,8 +71,8 @@ template <typename F>
 F triangle_light_pdf(const LightView& view, const UInt<F>& light, const LightReceiver<F>& from,
                      const Vec3<F>& dir, const F& t, const Mask<F>& active);
 
-/// Factors by which the contribution of lights is multiplied: the diffuse and specular multipliers,
-/// and 0 for bounces that hit a light that only light samples find (`LightRecord::sampled_only`).
+/// Factors by which the contribution of lights is multiplied: the diffuse and specular multipliers
+/// or, if a bounce hits a light that only light samples find (`LightRecord::sampled_only`), 0.
 /// These factors are used only if `LightView::has_effects` is set.
 template <typename F>
 struct LightEffect {
@@ -106,9 +106,9 @@ inline float infinite_selection_pdf(const LightView& view, uint32_t light) {
   return view.selection_pdf ? view.selection_pdf[light] : view.lights[light].selection_pdf;
 }
 
-/// Returns the balance heuristic weight of a bounce with density `p` (ignored for delta lobes)
-/// against light samples with density `light_pdf` and light paths, whose density is `others` times
-/// `p`.
+/// Returns the balance heuristic weight of a bounce with density `p` (ignored for delta lobes). The
+/// other techniques are light samples with density `light_pdf`, and light paths, whose density is
+/// `others` times `p`.
 template <typename F>
 inline F joint_bounce_weight(const F& p, const F& light_pdf, const Mask<F>& is_delta,
                              const F& others) {

@@ -7,7 +7,7 @@
 namespace wavecomb {
 
 /// Returns the lanes in which surfaces of link class `link` (0 if there is no surface, for example
-/// at the camera) belong to geometry set `set`; kNoSet contains all geometry.
+/// at the camera) belong to geometry set `set`; the set kNoSet contains all geometry.
 template <typename F>
 inline Mask<F> is_linked(const LinkView& links, const UInt<F>& link, const UInt<F>& set,
                          const Mask<F>& active) {

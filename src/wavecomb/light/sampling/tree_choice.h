@@ -36,8 +36,8 @@ namespace detail {
 
 /// Tolerance of cosines for rounding errors and for the quantisation of packed normals.
 inline constexpr float kCosineSlack = 4e-3f;
-/// Lower bound of the squared distance to a cluster, in units of its squared radius. The published
-/// value of this bound is 1, which treats all lights around a point as distant. On the street of
+/// Lower bound of the squared distance to a cluster, in units of its squared radius. In the paper,
+/// the bound is 1, which treats all lights around a point as distant. On the street of
 /// benchmarks/light_selection.py, a bound of 0.5 gives a quarter less error than a bound of 1 with
 /// 1,000 lights, a third less with 10,000 lights, and the same error with 100 lights. Bounds below
 /// 0.25 increase the error.
@@ -116,7 +116,7 @@ inline LightChoice<F> descend(const LightTreeView& tree, const LightReceiver<F>&
     const F right = light_importance<F>(r.data() + 8, to.p, normal, any_side);
     const F sum = left + right;
     F p_left = left / select(sum > 0.f, sum, F(1.f));
-    // A child that can contribute gets at least a minimum probability.
+    // If a child can contribute, its probability has a lower limit.
     const Mask<F> both = (left > 0.f) & (right > 0.f);
     p_left = select(both, clamp(p_left, F(0x1p-12f), F(1.f - 0x1p-12f)), p_left);
     const Mask<F> take_right = goes_right(p_left, descending);
@@ -131,10 +131,10 @@ inline LightChoice<F> descend(const LightTreeView& tree, const LightReceiver<F>&
 }
 
 /// Returns the light that u_light (a multiple of 2^-24 in [0, 1)) selects for `to`. Infinite lights
-/// have fixed intervals of u_light. Within the interval of the tree, the position of u_light is
-/// rescaled to [0, 1) for the choice at the first node; after each choice, the position within the
-/// chosen interval is rescaled for the next node. Bits below the precision of u_light are generated
-/// from `to.seed`.
+/// have fixed intervals of u_light. If u_light is in the interval of the tree, its position there,
+/// rescaled to [0, 1), selects a child of the root. The position within the interval of the
+/// selected child is rescaled in the same way for the next node. The bits of u_light that are
+/// missing after many choices are generated from `to.seed`.
 template <typename F>
 [[gnu::noinline]] LightChoice<F> choose_by_tree(const LightView& view, const LightReceiver<F>& to,
                                                 const F& u_light, const Mask<F>& active) {

@@ -21,12 +21,12 @@ LightCluster empty_at(const float (&p)[3]) {
   return c;
 }
 
-/// Quantizes a component of a unit vector: 65536 steps from -1 to 1.
+/// Quantises a component of a unit vector: 65536 steps from -1 to 1.
 uint32_t steps(double x) {
   return static_cast<uint32_t>(std::nearbyint(std::clamp(x * 0.5 + 0.5, 0.0, 1.0) * 65535));
 }
 
-/// Quantizes sin(angle / 2), rounding up.
+/// Quantises sin(angle / 2), rounding up.
 uint32_t half_sine(double angle, uint32_t most) {
   const double s = std::sin(std::clamp(angle, 0.0, std::numbers::pi) / 2) * most;
   return std::min(most, static_cast<uint32_t>(std::ceil(s)));
@@ -121,7 +121,7 @@ LightCluster bound_light(const LightRecord& light, double power) {
 
 LightCluster bound_light(const TriangleLight& light, double power) {
   LightCluster c = bound_corners(light.p, light.u, light.v, false);
-  // Intensity along the normal on each of the two sides.
+  // Intensity along the normal, for each of the two sides.
   c.intensity = power / (2 * std::numbers::pi);
   c.emission = std::numbers::pi / 2;
   c.normals.two_sided = true;

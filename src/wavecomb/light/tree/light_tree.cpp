@@ -31,8 +31,7 @@ constexpr size_t kBins = 12;
 /// Minimum effective number of lights for which a light tree reduces noise
 /// (docs/light-selection.md).
 constexpr float kMinForTree = 2;
-/// Maximum number of subtrees that are built in parallel, and minimum number of lights in each of
-/// them.
+/// Maximum number of subtrees that are built in parallel, and minimum number of lights per subtree.
 constexpr size_t kTasks = 64, kParallel = 4096;
 
 /// Range of lights below a tree node, and the path from the root to this node.
@@ -161,7 +160,7 @@ class Builder {
       for (size_t i = bins - 1; i > 0; --i) {
         sum.add(of[i]);
         if (sum.count == 0 || sum.count == items.size()) continue;
-        // Multiply by the regularity factor of Conty Estevez and Kulla, which penalizes thin
+        // Multiply by the regularity factor of Conty Estevez and Kulla, which penalises thin
         // bounds.
         const double all = (left[i - 1] + cost(sum, measure_)) * double{longest / extent};
         if (!(all < least)) continue;

@@ -35,12 +35,12 @@ struct LightTree {
 /// probabilities of infinite lights, and `effective_lights`. The result has no nodes and no trails.
 LightTree outline_light_tree(const LightSet& set, std::span<const double> powers);
 
-/// Returns whether LightSelection::kAuto uses a light tree for the given effective number of
-/// lights.
+/// Returns whether LightSelection::kAuto uses a light tree if the effective number of lights is
+/// `effective_lights`.
 bool prefers_tree(float effective_lights);
 
 /// Builds the light tree over the finite lights of `set` whose power is above 0; `powers` holds the
-/// powers of all lights in W. Binned splits minimize the surface area orientation heuristic (SAOH),
+/// powers of all lights in W. Binned splits minimise the surface area orientation heuristic (SAOH),
 /// down to single lights, after A. Conty Estevez and C. Kulla, "Importance Sampling of Many Lights
 /// with Adaptive Tree Splitting", 2018, section 4. The function runs in parallel; the result does
 /// not depend on the number of threads. Infinite lights are selected by power as in
@@ -48,8 +48,8 @@ bool prefers_tree(float effective_lights);
 LightTree build_light_tree(const LightSet& set, std::span<const double> powers);
 
 /// Returns whether lights are selected by tree. A scene without finite lights has no tree. kAuto
-/// uses the tree for many finite lights of similar power; selection by power suffices if a few
-/// strong lights dominate.
+/// uses the tree if there are many finite lights of similar power, because selection by power
+/// suffices where a few strong lights dominate.
 bool chooses_by_tree(LightSelection selection, const LightView& lights);
 
 }  // namespace wavecomb

@@ -24,7 +24,7 @@ inline Float4 most_of(const Float4& a, const Float4& b) {
   return a < b ? b : a;
 }
 
-/// Properties of a light of the tree that the split heuristic uses.
+/// Properties of a light that the split heuristic uses.
 struct alignas(16) Item {
   float lo[3];
   uint32_t light;
@@ -60,8 +60,8 @@ struct Bin {
   size_t count = 0;
 
   void add(const Item& item) {
-    // Triangles emit from both sides, so the sign of their normals is irrelevant: flip normals to
-    // the same side as the sum.
+    // Triangles emit from both sides, so the sign of their normals is irrelevant. Flip each normal
+    // to the side of the sum.
     const Float4 other = item.normals(), product = axis * other;
     const int32_t flip = product[0] + product[1] + product[2] < 0 ? INT32_MIN : 0;
     merge(item.low(), item.high(),

@@ -11,8 +11,8 @@
 namespace wavecomb {
 namespace {
 
-/// Fraction of light paths that start unaimed. Unaimed paths reach surfaces that no training path
-/// has hit, and they bound the weights of aimed paths.
+/// Fraction of light paths that start unaimed. Unaimed paths also reach surfaces that no training
+/// path has hit, and they limit the weights of aimed paths.
 constexpr float kEvenShare = 0.25f;
 /// Minimum number of training samples per sphere, and number of candidate split cells per axis.
 constexpr uint32_t kMinSamples = 4, kSplits = 16;

@@ -21,7 +21,7 @@ struct AimSample {
 ///
 /// With W_k the contribution in box k and A_k = r_k^2, the mixture chooses sphere k with a
 /// probability proportional to W_k and is uniform within the sphere. The log-likelihood of the
-/// mixture exceeds that of a single sphere by
+/// mixture exceeds the log-likelihood of a single sphere by
 ///   sum_k W_k log(W_k / A_k) - W log(W / A),
 /// which the splits maximise. `scene_radius` is the radius of the bounding sphere of all surfaces.
 /// Returns no spheres if fewer than four samples contribute.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Connections and merge points of light paths for camera paths of the reference integrator (the
-/// counterpart of NoJointTracer in reference/path_tracer.h).
+/// Connects camera paths of the reference integrator to light paths, and stores their merge points
+/// (the counterpart of NoJointTracer in reference/path_tracer.h).
 #pragma once
 
 #include <optional>

@@ -76,7 +76,7 @@ class LightTracer {
   }
 
  private:
-  /// State of a light path that arrives at its vertex number `depth`.
+  /// State of a light path on arrival at vertex number `depth`.
   struct Arrival {
     uint32_t depth;
     LightPathRow<F> path;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Training of the target spheres of light paths, before the first pass.
+/// Training of the target spheres at which light paths are aimed, before the first pass.
 ///
 /// Light paths are traced in rounds. The first round aims at the points that the camera sees, each
 /// later round at the target spheres fitted in the previous round. The training paths do not
@@ -24,20 +24,21 @@ struct LightAiming {
   double seconds = 0;
 };
 
-/// Trains the target spheres for a render with `context`, whose lights must be calibrated and emit
-/// light paths. Stops early if `stopped` returns true; the result is then invalid.
+/// Trains the target spheres for a render with `context`. The lights of `context` must be
+/// calibrated and emit light paths. Stops early if `stopped` returns true; the result is then
+/// invalid.
 LightAiming learn_to_aim(const WaveContext& context, const Scene& scene, const WaveSetup& waves,
                          const std::function<bool()>& stopped);
 
-/// Training of target spheres as a pilot of the light path transport. `run_pilots()` calls its
+/// Pilot of the light path transport that trains the target spheres. `run_pilots()` calls its
 /// functions (render/joint_transport.h).
 struct LightPathPilot {
   using Result = LightAiming;
   /// Makes the lights of `context` emit light paths, if the render uses light paths.
   static void prepare(const Scene& scene, WaveContext& context);
   /// Trains target spheres. If `earlier` is not null, uses the target spheres of this earlier
-  /// result instead. Sets the target spheres of the lights of `context`, which must not outlive the
-  /// result. Returns null if light paths are not aimed.
+  /// result instead. The lights of `context` then point to the target spheres in the result, so
+  /// `context` must not outlive the result. Returns null if light paths are not aimed.
   static std::shared_ptr<const LightAiming> run(const Scene& scene, const WaveSetup& waves,
                                                 const std::shared_ptr<const LightAiming>& earlier,
                                                 const std::function<bool()>& stopped,

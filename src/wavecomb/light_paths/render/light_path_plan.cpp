@@ -23,8 +23,8 @@ LightPathPlan::LightPathPlan(const Scene& scene, const Settings& settings, Light
 }
 
 uint32_t LightPathPlan::pass_samples(const Settings& settings, uint32_t samples) {
-  // With merging, a pass has one sample per pixel, since light paths are merged with the points of
-  // one sample of each pixel.
+  // With merging, a pass has one sample per pixel, since the light paths of a pass merge with the
+  // points of only one sample of each pixel.
   return settings.merges() ? 1 : samples;
 }
 

@@ -33,10 +33,10 @@ class LightPathPlan {
   LightPathPlan(const Scene& scene, const Settings& settings, LightPathShare share,
                 const CameraSetup& camera, const FilterTable& filter);
 
-  /// Returns the samples per pixel of a pass, given the number `samples` that it would have without
-  /// light paths.
+  /// Returns the samples per pixel of a pass. `samples` is the number that the pass would have
+  /// without light paths.
   static uint32_t pass_samples(const Settings& settings, uint32_t samples);
-  /// Adds to an empty film the sums to which light paths contribute.
+  /// Allocates the sums of light path contributions and the merge points of an empty film.
   void allocate(Film& film) const;
   /// Creates the light path data that all waves of the render read. `grid` is from LightPathPasses.
   LightPathContext context(const MergeGrid* grid) const;
@@ -58,13 +58,13 @@ class LightPathPlan {
 
 /// Returns the number of samples of each light path at the end of a pass.
 ///
-/// `done` is the number of samples of light paths so far. `before` and `after` are the samples of
-/// pixels at the start and the end of the pass. `share` is the maximum number of samples of light
-/// paths, which follows from the render's ratio of light paths to camera paths. `active_share` is
-/// |A| / P below.
+/// `done` is the number of samples of light paths so far. `before` and `after` are the sample
+/// counts of pixels at the start and the end of the pass. `share` is the maximum number of samples
+/// of light paths, which follows from the render's ratio of light paths to camera paths.
+/// `active_share` is |A| / P below.
 ///
-/// A pass traces |A| (after - before) camera paths for the |A| active pixels, and P paths for each
-/// sample of the P light paths. If V_c and V_l are the variances of one sample of camera paths and
+/// With |A| active pixels, a pass traces |A| (after - before) camera paths. Each sample of the P
+/// light paths traces P paths. If V_c and V_l are the variances of one sample of camera paths and
 /// light paths, n samples of pixels and m samples of light paths have the error V_c / n + V_l / m.
 /// For a given cost, the error is least if
 ///   m / n = sqrt(V_l |A| / (V_c P)).
@@ -81,18 +81,18 @@ class LightPathPasses {
  public:
   explicit LightPathPasses(const LightPathPlan& plan, const Settings& settings);
 
-  /// Returns the points with which light paths are merged, for LightPathPlan::context(), or null
-  /// without merging.
+  /// Returns the grid of merge points, for LightPathPlan::context(), or null if the render has no
+  /// merging.
   const MergeGrid* grid() const { return grid_.get(); }
   /// Returns the number of samples of each light path if each pixel has `samples` samples.
   uint32_t samples(uint32_t samples) const { return share_.samples(samples); }
   /// Returns the number of samples of each light path after a pass of an adaptive render. `done`
   /// and `light_done` are the samples of pixels and of light paths before the pass. `pass` holds
-  /// the pass's active pixels, whose number is `active`, and their target sample count.
+  /// the active pixels of the pass and their target sample count; `active` is their number.
   uint32_t adaptive_samples(const Film& film, const PassState& pass, uint32_t done,
                             uint32_t light_done, uint64_t active) const;
-  /// Plans the light paths that a pass still has to trace, up to `target` samples of each. The plan
-  /// is empty if the render has no light paths.
+  /// Plans the light paths that a pass still has to trace, until each has `target` samples. The
+  /// plan is empty if the render has no light paths.
   PassPlan plan(const Film& film, uint32_t target) const;
   /// Prepares the light paths of a pass. Call this function after the camera paths of the pass are
   /// finished.

@@ -13,12 +13,12 @@
 namespace wavecomb {
 namespace {
 
-/// Samples per pixel of a pilot render, and limits of its number of pixels. The samples suffice to
-/// show the effects of Sobol sequences and of roulette.
+/// Samples per pixel of a pilot render, and limits of its number of pixels. This number of samples
+/// suffices to show the effects of Sobol sequences and of roulette.
 constexpr uint32_t kTransportSamples = 8;
 constexpr uint64_t kMinTransportPixels = 400, kMaxTransportPixels = 16'384;
-/// A pilot render has the sample count of the render divided by kTransportShare. There are five
-/// pilot renders, three of which cost two or three times as much as the other two, so all of them
+/// A pilot render takes one sample for every kTransportShare samples of the render. There are five
+/// pilot renders, of which three cost two or three times as much as the other two. Together they
 /// take about a hundredth of the render time.
 constexpr uint64_t kTransportShare = 1000;
 constexpr std::array<uint32_t, 2> kTransportSeeds = {0x3c6ef372u, 0xa54ff53au};
@@ -28,9 +28,9 @@ constexpr double kPathVertex = 0.7, kJointVertex = 0.8;
 /// Additional costs of a camera path and of a light path vertex in renders with merging, in units
 /// of the cost of one ray.
 constexpr double kMergedPath = 1, kMergedVertex = 1;
-/// A second noise estimate leaves out this fraction of the pixels, those with the most noise. A
-/// single pixel may have most of the noise of a small image, so that results differ between pilot
-/// renders.
+/// A second noise estimate leaves out the noisiest pixels, which are this fraction of all pixels.
+/// In a small image, a single pixel may cause most of the noise, and results then differ between
+/// pilot renders.
 constexpr double kNoisiest = 0.01;
 /// Upper limit of a pixel's estimated squared error in a render without light paths, relative to
 /// the squared radiance that light paths contribute to the pixel. Light that camera paths rarely
@@ -54,8 +54,8 @@ std::array<uint32_t, 2> pilot_size(const Settings& s, uint64_t samples) {
   return {side(s.width), side(s.height)};
 }
 
-/// Returns the settings of the pilot renders, which trace light paths and ignore what the image
-/// stores.
+/// Returns the settings of the pilot renders, which trace light paths and store only the layers
+/// that the choice needs.
 Settings pilot_settings(const Settings& settings, uint32_t width, uint32_t height) {
   Settings small = settings;
   small.width = width;
@@ -133,8 +133,8 @@ double sum(const PixelNoise& noise) {
   return std::accumulate(noise.begin(), noise.end(), 0.0);
 }
 
-/// Returns the sum of the noise of all pixels except the fraction `kNoisiest` of the pixels with
-/// the most noise.
+/// Returns the sum of the noise of all pixels, without the noisiest pixels (a fraction `kNoisiest`
+/// of all pixels).
 double sum_of_most(PixelNoise noise) {
   const auto most =
       noise.end() - static_cast<ptrdiff_t>(kNoisiest * static_cast<double>(noise.size()));
@@ -143,7 +143,7 @@ double sum_of_most(PixelNoise noise) {
 }
 
 /// Returns whether a lobe of the given roughness is sharp. Returns true if the roughness varies,
-/// since the lobe may be sharp.
+/// since the lobe may be sharp at some points.
 bool is_sharp(float roughness, bool varies) {
   return varies || roughness < kSharpRoughness;
 }

@@ -4,14 +4,14 @@
 /// A render traces no light paths if the settings or the scene do not support them, if no surface
 /// is transmissive or glossy, or if no light emits light paths. Otherwise small images of the whole
 /// view are rendered before the first pass, two for each candidate ratio of light paths. (Each
-/// ratio needs its own images, because the MIS weights depend on the ratio, and the noise of both
-/// kinds of paths on the weights.) The noise without light paths cannot be measured in images of so
+/// ratio needs separate images, because the ratio determines the MIS weights, and these affect the
+/// noise of both kinds of paths.) The noise without light paths cannot be measured in images of so
 /// few samples, since camera paths may not find a caustic at all. The noise without light paths is
 /// therefore estimated from light paths (light_paths/light_vertex.h). Let e_camera be the squared
 /// error of the light that camera paths contribute in a render with light paths, e_left the squared
 /// error of the remaining light if camera paths had to find it, and c the cost without light paths,
-/// from counts of rays and vertices at fixed costs. The gain in efficiency of a ratio with squared
-/// error e_s and cost c_s is
+/// computed from the numbers of rays and vertices at fixed costs. The gain in efficiency of a ratio
+/// with squared error e_s and cost c_s is
 ///   (e_camera + e_left) c / (e_s c_s).
 /// The choice does not depend on seed, region, threads, waves or lanes, so that crops, resumed
 /// renders and merged renders use the same transport. Samples of the pilot do not contribute to the
@@ -34,7 +34,7 @@ namespace wavecomb {
 struct TransportChoice {
   Transport transport = Transport::kPath;
   LightPathShare share;  ///< for Transport::kLight
-  std::string why;       ///< reason as a clause, for messages about the choice
+  std::string why;       ///< reason for the choice, worded as a clause of a message
   /// Predicted efficiency relative to a render without light paths; 0 if not measured.
   double gain = 0;
   double seconds = 0;
@@ -52,27 +52,27 @@ struct TransportPilot {
 /// (`RenderOptions::wants_camera_squares`).
 using RenderPilot = std::function<TransportPilot(const Settings&, LightPathShare, bool)>;
 
-/// Candidate ratios of light paths. In tests with caustics, efficiency hardly depended on the ratio
-/// near the better candidate, with and without merging.
+/// Candidate ratios of light paths. In tests with caustics, ratios near the better candidate hardly
+/// differed in efficiency, with and without merging.
 inline constexpr std::array<LightPathShare, 2> kCandidateShares = {{{-3}, {0}}};
 
 /// Returns whether any material reflects or transmits light sharply enough for caustics.
 bool focuses_light(const Scene& scene);
 
-/// Chooses the transport for `settings`, whose render is expected to take `samples` samples, from
-/// small images made by `render`. If `stopped` returns true, the function stops and chooses
-/// `Transport::kPath`.
+/// Chooses the transport for `settings` from small images made by `render`. `samples` is the number
+/// of samples that the actual render is expected to take. If `stopped` returns true, the function
+/// stops and chooses `Transport::kPath`.
 TransportChoice choose_transport(const Scene& scene, const Settings& settings, uint64_t samples,
                                  const RenderPilot& render, const std::function<bool()>& stopped);
 
 // Exposed for tests.
 
-/// Results of the pilot renders, which have `width` columns.
+/// Results of the pilot renders, whose images are `width` pixels wide.
 struct TransportPilots {
   /// Two pilot renders with different seeds for each ratio of light paths.
   std::array<TransportPilot, 2> with[kCandidateShares.size()];
-  /// Estimated variance per sample of each pixel, if only camera paths sampled the light that light
-  /// paths contribute.
+  /// Estimated variance per sample of each pixel if only camera paths sampled the light that light
+  /// paths now contribute.
   std::vector<double> variance;
   uint32_t width = 0;
   bool merges = false;

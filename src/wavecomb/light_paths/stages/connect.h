@@ -45,8 +45,8 @@ void collect_connections(Wave& wave, const WaveContext& context, uint32_t depth)
   wave.counts.add_records(depth, n);
 }
 
-/// Connects the shaded vertices of camera paths at `depth`. The list of the next rays of camera
-/// paths does not change.
+/// Connects the shaded vertices of camera paths at `depth`. The list of the camera paths' next rays
+/// does not change.
 template <typename F>
 void connect(Wave& wave, const WaveContext& context, uint32_t depth) {
   using U = UInt<F>;

@@ -10,7 +10,7 @@ namespace wavecomb {
 
 /// Starts a light path in each slot of the wave, and fills the ray queue with the paths for which a
 /// light was sampled. A slot has the same pixel and sample as the camera path that generate() would
-/// start in it.
+/// start in this slot.
 template <typename F>
 void generate_light(Wave& wave, const WaveContext& context, const WaveTask& task) {
   using U = UInt<F>;

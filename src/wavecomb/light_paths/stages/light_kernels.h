@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Tables of the kernels for light paths, by program id. A separate translation unit compiles each
-/// kernel (wave/kernels/kernel_matrix.h); this header only declares them.
+/// Tables of the kernels for light paths, by program id. Each kernel is compiled in a separate
+/// translation unit (wave/kernels/kernel_matrix.h); this header only declares the kernels.
 #pragma once
 
 #include "wavecomb/light_paths/light_path.h"

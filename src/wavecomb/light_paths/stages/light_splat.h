@@ -18,7 +18,7 @@ inline LightSplatPoint light_splat_point(const SampleKey<float>& key, uint32_t d
 }
 
 /// Adds a contribution of light path sample `sample` to the sums of the pixels around `at`. The
-/// sums are integers, so that the order does not matter.
+/// sums are integers, so that the order of additions does not matter.
 inline void add_light_splat(const WaveContext& context, LightSplatList& list, uint32_t sample,
                             const LightSplatPoint& at, const Color<float>& c) {
   Film& film = *context.film;

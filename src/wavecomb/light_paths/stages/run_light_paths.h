@@ -57,7 +57,7 @@ void run_light_paths(Wave& wave, const WaveContext& context, const WaveTask& tas
 /// NoJointStages in wave/run_wave.h).
 template <typename F>
 struct LightPathJointStages {
-  /// Traces the light paths to whose vertices the camera paths of the task connect.
+  /// Traces the light paths that the camera paths of the task connect to.
   static void begin(Wave& wave, const WaveContext& context, const WaveTask& task) {
     LightPathBuffers& light = wave.joint;
     if (light.merge_points) light.merge_points.clear(task.path_count());

@@ -21,8 +21,8 @@ WAVECOMB_INLINE LightVertexResult<F> shade_one_of_light(const Vertex<F, kFeature
 }
 
 /// Shades the queued hits [begin, end) of light paths, in the order of the shading queue.
-/// LightPathBuffers::use says what the light paths are traced for. For connections to the camera,
-/// the fields `group` and `set` of ShadowRow hold the film position (x, y) of the contribution.
+/// LightPathBuffers::use is the purpose of the light paths. For connections to the camera, the
+/// fields `group` and `set` of ShadowRow hold the film position (x, y) of the contribution.
 template <typename Bsdf, typename F, uint32_t kFeatures>
 void shade_light_batch(Wave& wave, const WaveContext& context, const ShadeSettings& settings,
                        uint32_t depth, size_t begin, size_t end) {

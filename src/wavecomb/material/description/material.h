@@ -48,7 +48,7 @@ struct TextureUse {
   std::array<float, 6> uv{1, 0, 0, 0, 1, 0};
 };
 
-/// A material. The defaults are those of UsdPreviewSurface.
+/// A material. The defaults are the defaults of UsdPreviewSurface.
 struct Material {
   std::string name;
   ProgramId program = ProgramId::kPrincipled;
@@ -61,14 +61,16 @@ struct Material {
   float clearcoat_roughness = 0.01f;
   float opacity = 1;
   float ior = 1.5f;
-  /// If the threshold is above 0, opacity below it is replaced by 0, and any other opacity by 1.
+  /// If the threshold is above 0, opacities below the threshold become 0, and all other opacities
+  /// become 1.
   float opacity_threshold = 0;
   /// Measured complex index of refraction, for the program "metal". If any component of
   /// `conductor_k` is above 0, the index replaces F0 and F82.
   Vec3<float> conductor_eta{0, 0, 0}, conductor_k{0, 0, 0};
   /// For "principled": `specular_color` gives F0, and `metallic` is ignored.
   bool specular_workflow = false;
-  /// For "principled": opacity cuts out the surface instead of making it transparent.
+  /// For "principled": opacity cuts out parts of the surface instead of making the surface
+  /// transparent.
   bool presence = false;
   std::array<TextureUse, kInputCount> textures;
   OpenPbr openpbr;  ///< inputs that only the program "openpbr" uses

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Table of material parameters other than textures, graphs and the inputs of OpenPBR
-/// (material/description/openpbr_inputs.h): one row for each such member of Material, and for the
-/// parameters specific to one program (material/description/programs.h). Range checks, the scene
+/// (material/description/openpbr_inputs.h). Each such member of Material has a row, and so has each
+/// parameter specific to one program (material/description/programs.h). Range checks, the scene
 /// fingerprint, Python keywords and edits, and sandbox calls are derived from the table. To add a
 /// parameter of several programs, add a member to Material and to MaterialRecord, a row here, a
 /// line in scene_materials.cpp, which packs records, and the code that uses the parameter. To add a

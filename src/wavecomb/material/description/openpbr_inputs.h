@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Inputs of the program "openpbr" beyond the inputs that all programs share, in one table from
-/// which descriptions, checks, records, parameters at hits, graph outputs and Python names are
-/// derived.
+/// Table of the inputs of the program "openpbr", except for the inputs that all programs share.
+/// Descriptions, checks, records, parameters at hits, graph outputs and Python names are derived
+/// from the table.
 #pragma once
 
 #include <cstdint>

@@ -50,8 +50,8 @@ inline constexpr uint32_t kSubsurface = 128;  ///< materials may have subsurface
 ///
 /// The code is in material/programs/NAME.h, which material/program_table.h includes for tests. A
 /// row starts with P if the BSDF class has reduced variants (material/description/variants.h), and
-/// with X otherwise. CMake also reads this list, which requires two spaces and one row on each
-/// line. Add new programs at the end, since fingerprints contain the ids.
+/// with X otherwise. CMake also reads this list, so each row must begin on a new line, after two
+/// spaces. Add new programs at the end, since fingerprints contain the ids.
 #define WAVECOMB_PROGRAMS(X, P)                                                       \
   X(diffuse, Diffuse, 0, 60)                                                          \
   X(metal, Metal, kGlossy, 75)                                                        \
@@ -65,7 +65,7 @@ inline constexpr uint32_t kSubsurface = 128;  ///< materials may have subsurface
     {"tint_r", 1, 0, 1}, {"tint_tt", 1, 0, 1}, {"tint_trt", 1, 0, 1})
 
 /// Programs for collisions in media (path/media.h), in the same format. Meshes cannot use these
-/// programs, whose code is in src/wavecomb/medium.
+/// programs. Their code is in src/wavecomb/medium.
 #define WAVECOMB_MEDIUM_PROGRAMS(M) M(volume, Volume, kGlossy, 150)
 
 enum class ProgramId : uint8_t {
@@ -111,7 +111,7 @@ inline constexpr uint32_t kSurfaceProgramCount = kProgramCount - kMediumProgramC
 constexpr const ProgramInfo& info_of(ProgramId program) {
   return kPrograms[static_cast<size_t>(program)];
 }
-/// Returns whether a program has any trait of `traits`, bits of program_trait.
+/// Returns whether a program has any of `traits` (bits of program_trait).
 constexpr bool has_trait(ProgramId program, uint32_t traits) {
   return (info_of(program).traits & traits) != 0;
 }

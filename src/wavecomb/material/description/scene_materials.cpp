@@ -111,7 +111,7 @@ SceneMaterials::SceneMaterials(std::vector<Material> all, std::shared_ptr<const 
                                std::span<const TexturePtr> textures, uint32_t exit_material,
                                bool in_glass_)
     : materials(std::move(all)), graphs(std::move(programs_)), in_glass(in_glass_) {
-  // use the floating-point mode of kernels, so that results are equal
+  // Use the same floating-point mode as kernels, so that results are identical.
   const DenormalsOff denormals_off;
   event_material = add_inside_material(materials, *graphs, in_glass);
   for (const Material& m : materials) shaded.push_back(simplified(m, *graphs, textures));

@@ -46,8 +46,8 @@ bool is_color(Input input) {
 }
 
 /// Returns the constant value that a graph gives to a material input, or an empty value if the
-/// graph can give different values at different hits. The input has `count` components, from
-/// `first` on in GraphParameter.
+/// graph can give different values at different hits. The input has `count` components, which start
+/// at `first` in GraphParameter.
 std::optional<Vec3<float>> only_value(const DrivenRanges& ranges, uint32_t first, uint32_t count) {
   float value[3] = {0, 0, 0};
   for (uint32_t c = 0; c < count; ++c) {
@@ -67,7 +67,7 @@ InputRange input_range(Input input, const TextureUse& use, const Texture& textur
   for (uint32_t c = 0; c < 3; ++c) {
     const uint32_t from = use.channel < 4 ? use.channel : c;
     // Kernels compute the input with the same fused multiply-add. Its rounding is monotonic, so the
-    // results for the smallest and the largest texel bound those of all texels.
+    // results for the smallest and the largest texel are bounds for all texels.
     const auto at = [&](float texel) { return fma(texel, use.scale[from], use.bias[from]); };
     const auto [least, most] = std::minmax({at(texels.low[from]), at(texels.high[from])});
     const uint32_t component = first + (is_color(input) || input == Input::kNormal ? c : 0);

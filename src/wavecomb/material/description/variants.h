@@ -54,8 +54,8 @@ inline constexpr Variant kVariants[] = {
 };
 inline constexpr uint32_t kVariantCount = sizeof(kVariants) / sizeof(Variant);
 
-/// Returns the id of the program called `name`. A call with an unknown name does not compile,
-/// because the function must be a constant expression.
+/// Returns the id of the program called `name`. `name` must exist; in a constant expression, an
+/// unknown name does not compile.
 constexpr ProgramId program_id(std::string_view name) {
   uint32_t i = 0;
   while (name != kProgramNames[i]) ++i;
@@ -67,8 +67,8 @@ constexpr ProgramId program_of(uint32_t variant) {
 }
 
 /// Returns the features that a simplified material (simplified_material.h) may use, for any texture
-/// values and any graph outputs within their ranges (ranges.h). The graphs may read `textures`.
-/// `allows_subsurface` is set if the scene has subsurface random walks.
+/// values and any graph outputs within their ranges (ranges.h). `textures` are the textures that
+/// the graphs may read. `allows_subsurface` is set if the scene has subsurface random walks.
 uint32_t parts_of(const Material& material, const GraphSet& graphs,
                   std::span<const TexturePtr> textures, bool allows_subsurface = false);
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Emission and opacity of materials at hits. Traversal and light sampling call these functions.
-/// Shading evaluates the emission of its hits by material/params.h, from the same inputs and
-/// graphs.
+/// Shading evaluates emission in material/params.h instead, from the same inputs and graphs.
 ///
 /// Graphs override textures, and textures override constants, for each component.
 #pragma once
@@ -13,7 +12,7 @@ namespace wavecomb {
 
 namespace detail {
 
-/// Makes the inputs of a value graph at a point of which only the texture coordinates are known.
+/// Makes the inputs of a value graph at a point where only the texture coordinates are known.
 template <typename F>
 struct UvOnly {
   const Vec2<F>& uv;
@@ -29,8 +28,8 @@ struct UvOnly {
 }  // namespace detail
 
 /// Returns the radiance that the surface emits at `uv`, regardless of its presence. `footprint` is
-/// the ray's footprint in uv space. Graphs get the inputs that `make_point(active)` returns, which
-/// is called only if there is a graph.
+/// the ray's footprint in uv space. `make_point(active)` returns the inputs of the graph, and is
+/// called only if there is a graph.
 template <typename F, typename MakePoint>
 inline Color<F> fetch_emission(const MaterialView& view, const UInt<F>& material, const Vec2<F>& uv,
                                const Footprint<F>& footprint, const MakePoint& make_point,
@@ -43,7 +42,7 @@ inline Color<F> fetch_emission(const MaterialView& view, const UInt<F>& material
   if (none(driven)) return plain;
   return graph_value<F>(view, graph, kEmissionOutput, make_point(driven), driven, plain);
 }
-/// Returns the emission for graphs that read only uv.
+/// Overload for graphs that read only texture coordinates.
 template <typename F>
 inline Color<F> fetch_emission(const MaterialView& view, const UInt<F>& material, const Vec2<F>& uv,
                                const Footprint<F>& footprint, const Mask<F>& active) {
@@ -71,7 +70,7 @@ inline F fetch_opacity(const MaterialView& view, const UInt<F>& material, const 
   const F present = select(threshold > 0.f, cut, opacity);
   return select(detail::opacity_is_presence(inputs, threshold), present, F(1.f));
 }
-/// Returns the presence for graphs that read only uv.
+/// Overload for graphs that read only texture coordinates.
 template <typename F>
 inline F fetch_opacity(const MaterialView& view, const UInt<F>& material, const Vec2<F>& uv,
                        const Footprint<F>& footprint, const Mask<F>& active) {

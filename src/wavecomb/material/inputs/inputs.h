@@ -52,8 +52,8 @@ struct InputReader {
     if (none(textured)) return constant;
     const UInt<F> index = material * kInputCount + static_cast<uint32_t>(s);
     const auto use = make_reader<TextureUseRecord, F>(view.uses, index, uniform, textured);
-    // Emission is filtered isotropically: emitters are few and bright, and light samples have no
-    // ray footprint.
+    // Emission textures use an isotropic footprint: emitters are few and bright, and light samples
+    // have no ray footprint.
     const Footprint<F> lookup_footprint =
         s == Input::kEmission ? Footprint<F>(footprint.width) : footprint;
     return select<F>(textured, read_texture<F>(view, use, uv, lookup_footprint, textured),
@@ -77,7 +77,7 @@ inline Color<F> valid_emission(const Color<F>& c) {
           min(max(c.z, F(0.f)), F(kMaxEmission))};
 }
 
-/// Returns the lanes whose opacity is presence instead of transparency.
+/// Returns the lanes whose opacity is the presence of the surface instead of transparency.
 template <typename F>
 inline Mask<F> opacity_is_presence(const InputReader<F>& inputs, const F& threshold) {
   const UInt<F> flags = inputs.record[&MaterialRecord::flags];

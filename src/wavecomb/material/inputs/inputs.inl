@@ -15,7 +15,7 @@ Vec3<F> read_texture(const MaterialView& view, const RecordReader<F>& use, const
   for (size_t i = 0; i < 6; ++i) m[i] = use.at(&R::uv, i);
   const F s = fma(m[0], uv.x, fma(m[1], uv.y, m[2]));
   const F t = fma(m[3], uv.x, fma(m[4], uv.y, m[5]));
-  // The footprint grows by the length of the longer transformed axis.
+  // The footprint is scaled by the length of the longer transformed axis.
   const F stretch = sqrt(max(fma(m[0], m[0], F(m[3] * m[3])), fma(m[1], m[1], F(m[4] * m[4]))));
   const Footprint<F> lookup_footprint = footprint.scaled(stretch);
   const UInt<F> id = use[&R::texture];

@@ -9,8 +9,8 @@
 
 namespace wavecomb {
 
-/// Returns the lanes whose materials are cut out by opacity, so that the presence of the surface
-/// must be looked up.
+/// Returns the lanes whose materials are cut out by opacity. In these lanes, the presence of the
+/// surface must be looked up.
 template <typename F>
 inline Mask<F> has_presence(const MaterialView& view, const UInt<F>& material,
                             const Mask<F>& active) {
@@ -20,9 +20,9 @@ inline Mask<F> has_presence(const MaterialView& view, const UInt<F>& material,
 }
 
 /// Makes the inputs of a value graph at a point of a mesh that no path has hit. On triangles, the
-/// inputs are the position without motion, and the geometric normal as normal and as viewing
-/// direction. On curves and points, the inputs are only the texture coordinates. Images are read at
-/// their finest level.
+/// graph gets the position without motion, and the geometric normal both as the normal and as the
+/// viewing direction. On curves and points, the graph gets only texture coordinates. Textures are
+/// read at their finest level.
 template <typename F>
 [[gnu::noinline, gnu::cold]] GraphPoint<F> point_at_rest(const MeshRecord* meshes,
                                                          const InstanceRecord* instances,

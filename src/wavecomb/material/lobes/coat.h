@@ -6,8 +6,8 @@
 
 namespace wavecomb {
 
-/// Index of refraction of a coat seen from outside. An index below 1 is inverted: its reflectance
-/// at normal incidence is the same, and there is no total reflection.
+/// Index of refraction of a coat seen from outside. An index below 1 is replaced by its inverse,
+/// which has the same reflectance at normal incidence but no total internal reflection.
 template <typename F>
 inline F coat_ior(const F& ior) {
   return max(ior, F(1.f / ior));

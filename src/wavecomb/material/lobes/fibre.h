@@ -106,8 +106,8 @@ inline F wrapped_angle(const F& x) {
   return clamp(fma(turns, F(-2.f * kPi), x), F(-kPi), F(kPi));
 }
 
-/// Longitudinal variance of longitudinal roughness r, and azimuthal scale of azimuthal roughness r
-/// (Chiang et al. 2016, eq. 7 and 8).
+/// Longitudinal variance for longitudinal roughness r, and azimuthal scale for azimuthal roughness
+/// r (Chiang et al. 2016, eq. 7 and 8).
 template <typename F>
 inline F fibre_variance(const F& r) {
   const F r2 = r * r, r4 = r2 * r2, r8 = r4 * r4, r20 = r8 * r8 * r4;
@@ -165,8 +165,8 @@ struct Fibre {
   void tilt_view(View& v) const;
 };
 
-/// Rotates the lobes for scales tilted by a towards the root: R by 2 a, TT by -a and TRT by -4 a
-/// (Chiang et al. 2016, 4.1.2; Marschner et al. 2003).
+/// Rotates the lobes for cuticle scales that are tilted towards the root by an angle a: R by 2 a,
+/// TT by -a and TRT by -4 a (Chiang et al. 2016, 4.1.2; Marschner et al. 2003).
 template <typename F>
 inline void Fibre<F>::tilt_view(View& v) const {
   constexpr float kTurns[3] = {-2.f, 1.f, 4.f};
@@ -237,8 +237,8 @@ inline void Fibre<F>::eval(const View& v, const Vec3<F>& wi, Color<F>& f_cos, F&
   }
 }
 
-/// `u_lobe` selects the lobe. Its position within the lobe's probability, rescaled to [0, 1),
-/// serves as a further sample value.
+/// `u_lobe` selects the lobe. The position of `u_lobe` within the lobe's probability interval,
+/// rescaled to [0, 1), serves as another sample value.
 template <typename F>
 inline Vec3<F> Fibre<F>::sample(const View& v, const F& u_lobe, const F& u, const F& u_turn) const {
   F below(0.f), share = v.share[0], sin_o = v.sin_tilted[0], cos_o = v.cos_tilted[0];

@@ -22,7 +22,7 @@ inline F schlick_weight(const F& cos_i) {
   return m2 * m2 * m;
 }
 
-/// Reflectance at normal incidence of the relative index `eta`: ((1 - eta) / (1 + eta))^2.
+/// Reflectance at normal incidence for the relative index `eta`: ((1 - eta) / (1 + eta))^2.
 template <typename F>
 inline F f0_from_ior(const F& eta) {
   return sqr(F(F(1.f - eta) / F(1.f + eta)));

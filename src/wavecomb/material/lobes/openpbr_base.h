@@ -45,13 +45,13 @@ struct OpenPbrFacet {
 ///   reflection    f cos = R(h) D G2 / (4 z_o),                      pdf = p_R D G1 / (4 z_o);
 ///   transmission  f cos = T(h) D G2 |wi.h wo.h| / (z_o c^2 eta^2),
 ///                 pdf = p_T D G1 |wi.h wo.h| / (z_o c^2),           c = wi.h + wo.h / eta
-/// (Walter et al. 2007). The transmission of thin walls is the reflection lobe, mirrored.
+/// (Walter et al. 2007). Thin walls transmit light through a mirrored copy of the reflection lobe.
 ///
 /// Multiple scattering is compensated by scaling (Turquin 2019): metals by 1 + F0 (1 - E) / E,
 /// transmission by 1 / (E_R + E_T).
 ///
 /// E_R + E_T is not tabulated for thin films, anisotropic surfaces, and interfaces whose
-/// reflectance differs from that of their index (specular_weight). In these cases, reflection and
+/// reflectance does not follow from their index (specular_weight). In these cases, reflection and
 /// transmission of each microfacet are scaled by s / (R g_R + (1 - R) g_T), with g = G2 / G1 of the
 /// respective direction. s is the same sum for the bare isotropic interface, whose E_R + E_T is
 /// tabulated. A film therefore changes the ratio of reflection to transmission but not their sum.

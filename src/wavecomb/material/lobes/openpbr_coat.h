@@ -64,8 +64,8 @@ struct OpenPbrCoat {
 
   /// Darkening of the base for a viewer at cosine `z`: (1 - K) / (1 - K E_base), because the coat
   /// reflects light back to the base (OpenPBR 1.1, "Coat darkening"). `albedo` is E_base, `spread`
-  /// is how diffuse the base is (0 to 1), and `inside` marks lanes seen from within, which are not
-  /// darkened.
+  /// is how diffuse the base is (0 to 1), and `inside` marks lanes whose viewer is inside, where
+  /// the base is not darkened.
   Color<F> darkened(const F& z, const Color<F>& albedo, const F& spread,
                     const Mask<F>& inside) const {
     const F mirror = fresnel_dielectric(z, ior).reflectance;

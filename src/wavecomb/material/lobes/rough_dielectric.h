@@ -48,7 +48,8 @@ inline BsdfEval<F> eval_rough_dielectric(const RoughDielectric<F>& lobe, const V
   const F up = copysign(F(1.f), sum.z) * side;  // flips h to the side of wo
   const Vec3<F> h = sum * F(inv_len * up);
   const F oh = dot(wo, h), ih = dot(wi, h);
-  // Microfacets seen from behind are invalid; refraction has wo and wi on opposite sides of h.
+  // Microfacets seen from behind are invalid. For refraction, wo and wi must be on opposite sides
+  // of h.
   const Mask<F> valid = nonzero & (oh > 0.f) & (F(h.z * side) > 0.f) &
                         ((reflects & (ih > 0.f)) | (not_(reflects) & (ih < 0.f)));
   const F r = fresnel_dielectric(oh, eta, schlick).reflectance;
@@ -65,8 +66,8 @@ inline BsdfEval<F> eval_rough_dielectric(const RoughDielectric<F>& lobe, const V
   return {color * f_cos, select(valid, F(base * g1), F(0.f))};
 }
 
-/// Samples a visible normal, then reflection with probability R. The weight is G2 / G1, times tint
-/// / eta^2 for transmission.
+/// Samples a visible normal, then chooses reflection with probability R. The weight is G2 / G1,
+/// times tint / eta^2 for transmission.
 template <typename F>
 inline BsdfSample<F> sample_rough_dielectric(const RoughDielectric<F>& lobe, const Vec3<F>& wo,
                                              const F& u_lobe, const F& u, const F& v) {

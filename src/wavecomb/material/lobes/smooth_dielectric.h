@@ -21,8 +21,8 @@ inline Vec3<F> refract(const Vec3<F>& wo, const Vec3<F>& h, const F& cos_o, cons
   return fma(h, fma(cos_o, inv, F(-cos_t)), Vec3<F>(wo * F(-inv)));
 }
 
-/// Samples reflection with probability R. A transmitted sample has the weight tint / eta^2, as
-/// radiance scales (Veach, "Robust Monte Carlo Methods", 1997, section 5.2).
+/// Samples reflection with probability R. A transmitted sample has the weight tint / eta^2, since
+/// refraction scales radiance (Veach, "Robust Monte Carlo Methods", 1997, section 5.2).
 template <typename F>
 inline BsdfSample<F> sample_smooth_dielectric(const Vec3<F>& wo, const F& ior, const Color<F>& tint,
                                               bool schlick, const F& u_lobe) {

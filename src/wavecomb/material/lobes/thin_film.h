@@ -10,11 +10,11 @@ namespace detail {
 
 /// Sensor response to the interference term cos(2 pi opd / lambda), with the optical path
 /// difference in nanometres: the Fourier transform of Gaussian fits to the colour matching
-/// functions. Linear Rec.709, normalised to 1 for opd = 0.
+/// functions. The response is in linear Rec.709, normalised to 1 for opd = 0.
 template <typename F>
 inline Color<F> film_sensitivity(const F& opd) {
   // Amplitude, position (1 / m) and variance of the lobes of x, y and z, and of the second lobe of
-  // x. The amplitudes are those of the paper's code times sqrt(2 pi variance), normalised.
+  // x. The amplitudes come from the paper's code, multiplied by sqrt(2 pi variance) and normalised.
   const auto lobe = [&opd](float value, float turns_per_nm, float variance) {
     const F phase = opd * (2.f * kPi * 1e-9f);
     return F(value * sincos_2pi(F(opd * (turns_per_nm * 1e-9f))).cos *

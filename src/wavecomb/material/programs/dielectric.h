@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Program "dielectric": glass and liquids, smooth or rough. Outside is wo.z > 0; inside, the
-/// relative index is 1 / ior, and total internal reflection is possible.
+/// Program "dielectric": glass and liquids, smooth or rough. The viewer is outside if wo.z > 0.
+/// Inside, the relative index is 1 / ior, and total internal reflection is possible.
 #pragma once
 
 #include "wavecomb/material/lobes/rough_dielectric.h"

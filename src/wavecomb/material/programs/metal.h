@@ -12,7 +12,7 @@ namespace wavecomb {
 
 /// Metal BSDF. The reflectance of a metal is base_color at normal incidence with a tint at 82
 /// degrees or, with kConductorIndex set, the Fresnel reflectance of the measured complex index. A
-/// black tint, the default, means white, which is Schlick's formula.
+/// black tint, the default, stands for a white tint, which gives Schlick's formula.
 template <typename F>
 class MetalBsdf : public BsdfTraits {
  public:

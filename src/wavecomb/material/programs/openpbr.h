@@ -18,7 +18,7 @@ namespace wavecomb {
 /// OpenPBR BSDF: fuzz on a coat on a base of metal, glossy diffuse and transmission. A layer with
 /// directional albedo E towards the viewer scales the layers below by 1 - E (the specification's
 /// albedo scaling), so energy is conserved, but the BSDF is not reciprocal. Lobes are sampled in
-/// proportion to their estimated contribution; eval and pdf return values of the mixture.
+/// proportion to their estimated contribution; eval and pdf return values of the whole mixture.
 ///
 /// Opaque and thin-walled surfaces are two-sided. Inside a transmissive solid there is no fuzz, and
 /// the coat does not reflect. Subsurface scattering is diffuse reflection, or, with random walks,
@@ -38,12 +38,12 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   static constexpr bool kReadsIor = true;
   static constexpr bool kEmits = (kParts & kEmissionPart) != 0;
   static constexpr bool kAbsorbs = (kParts & kTransmissionPart) != 0;
-  // Equal for all variants, because light selection in the light tree depends on `kTransmits`.
+  // The same for all variants, because light selection in the light tree depends on this value.
   static constexpr bool kTransmits = true;
   static constexpr bool kHasSubsurface = kBack;
   static constexpr bool kTextured = (kParts & (kTexturePart | kAnisotropyPart)) != 0;
   using Params = OpenPbrParams<F>;
-  /// All inputs or none, because a single textured input aligns the frame with the texture.
+  /// Inputs that may read textures: all or none, since any texture aligns the tangent frame.
   static constexpr uint32_t kInputs =
       !kTextured ? 0u
                  : input_bit(Input::kBaseColor) | input_bit(Input::kSpecularColor) |
@@ -59,7 +59,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
       fuzz_color_ = p.fuzz_color;
     }
     if constexpr (kCoat) coat_ = OpenPbrCoat<F>(p);
-    // Fraction of subsurface light that leaves on the other side: half of it through thin walls,
+    // Fraction of subsurface light that leaves on the other side: half of the light for thin walls,
     // adjusted by anisotropy, or all of it if a random walk follows.
     const F sub = p.subsurface_weight;
     Color<F> under = p.subsurface_color;
@@ -128,7 +128,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
     Color<F> glossy;      ///< transmission through the glossy interface to the diffuse base
     F fuzz_on, coat_on;   ///< weights of fuzz and coat on the viewer's side
     F under_fuzz;         ///< transmission through the fuzz
-    F coat_compensation;  ///< scale of coat reflection for multiple scattering
+    F coat_compensation;  ///< factor of coat reflection due to multiple scattering
     /// Transmission of the layers above the base: bare + coated coat_color^(1 / (2 mu_i)).
     Color<F> bare, coated;
     F p_diffuse, p_back, p_fuzz, p_coat, p_base;
@@ -142,7 +142,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
     v.base = base_.view(v.o, wo.z < 0.f, energy_);
     v.eon = eon_.sampler(z);
     v.glossy = (Color<F>(F(1.f)) - v.base.gloss) * base_.opaque;
-    // The layers of a transmissive solid are on its outside only.
+    // Transmissive solids have layers only on the outside.
     const F outside = select(v.base.inside, F(0.f), F(1.f));
     if constexpr (kFuzz) v.fuzz_on = fuzz_ * outside;
     if constexpr (kCoat) v.coat_on = coat_.weight * outside;
@@ -242,8 +242,8 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   }
 
  private:
-  /// Sets weight and pdf of the samples `delta` along `wi`, which are in the smooth lobes of coat
-  /// (`delta_coat`) or base.
+  /// Sets weight and pdf in the lanes `delta`, whose samples along `wi` are in the smooth lobe of
+  /// the coat (`delta_coat`) or of the base.
   WAVECOMB_INLINE void weigh_deltas(const View& view, const Vec3<F>& wi, const Mask<F>& delta,
                                     const Mask<F>& delta_coat, const Mask<F>& refracted,
                                     BsdfSample<F>& s) const {
@@ -264,7 +264,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
     s.weight = select<F>(delta, f * F(1.f / p), s.weight);
     s.pdf = select(delta, p, s.pdf);
     s.is_delta = delta;
-    // A sample that carries no light is invalid, for example after almost complete absorption.
+    // A sample without contribution is invalid, for example after almost complete absorption.
     const Mask<F> carries_no_light = delta & is_black(s.weight);
     s.pdf = select(carries_no_light, F(0.f), s.pdf);
     s.is_delta = s.is_delta & not_(carries_no_light);

@@ -10,8 +10,8 @@
 
 namespace wavecomb {
 
-/// Plastic BSDF, f = coat + base_color / pi * coat_transmission. Uses the albedos of the coat at
-/// its roughness, including multiple scattering, so a white base under a lossless coat keeps all
+/// Plastic BSDF, f = coat + base_color / pi * coat_transmission. The albedos of the coat account
+/// for its roughness and for multiple scattering, so a white base under a lossless coat keeps all
 /// energy.
 template <typename F>
 class PlasticBsdf : public BsdfTraits {
@@ -79,14 +79,15 @@ class PlasticBsdf : public BsdfTraits {
  private:
   F reflectance(const F& cos_i) const { return coat_(coat_.f0_exact, cos_i); }
 
-  /// Directional albedo of the coat for cosine z: the Fresnel reflectance if it is smooth.
+  /// Directional albedo of the coat for cosine z, which is the Fresnel reflectance for a smooth
+  /// coat.
   F coat_albedo(const F& z) const {
     const F lost = select(smooth_, F(0.f), lost_(z));
     return interface_.albedo(coat_.f0_exact, F(0.f), z, lost);
   }
 
-  /// Probability of sampling the coat, in proportion to its contribution. The probability of the
-  /// coat is clamped to [0.05, 0.95] unless the base is black.
+  /// Probability of sampling the coat: its fraction of the estimated contribution of coat and base,
+  /// clamped to [0.05, 0.95] unless the base is black.
   F coat_probability(const F& coat) const {
     const F diffuse = luminance(base_) * F(1.f - coat);
     const F share = coat / max(F(coat + diffuse), F(1e-20f));

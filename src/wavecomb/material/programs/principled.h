@@ -15,15 +15,16 @@
 
 namespace wavecomb {
 
-/// Clearcoat over specular reflection over { diffuse, straight transmission } ("UsdPreviewSurface
-/// Specification", OpenUSD); two-sided: specular GGX with multiple scattering, which is sampled as
-/// diffuse. F90 = 1, and F0 = lerp(((1 - ior) / (1 + ior))^2, base_color, metallic), or
-/// specular_color in the specular workflow; diffuse base_color (1 - metallic) opacity, times the
-/// transmission of the specular interface by its rough albedo (RoughInterface); transmission (1 -
-/// opacity) times the transmission of the interface, straight through; clearcoat GGX of the same
-/// index times `clearcoat`. The clearcoat dims the layers below by its albedo at the more grazing
-/// of the two directions, which is reciprocal and adds no energy. docs/decisions/preview-surface.md
-/// compares this program with the specification and with other renderers.
+/// Two-sided BSDF of UsdPreviewSurface ("UsdPreviewSurface Specification", OpenUSD): clearcoat over
+/// specular reflection over diffuse reflection and straight transmission. The specular lobe is GGX
+/// with multiple scattering, which is sampled with the diffuse lobe. F90 is 1, and F0 is lerp(((1 -
+/// ior) / (1 + ior))^2, base_color, metallic), or specular_color in the specular workflow. The
+/// diffuse colour is base_color (1 - metallic) opacity, and straight transmission is 1 - opacity;
+/// both are multiplied by the transmission of the specular interface, which follows from its rough
+/// albedo (RoughInterface). The clearcoat is a GGX lobe of the same index, times `clearcoat`. It
+/// dims the layers below by its albedo at the more grazing of the two directions, which is
+/// reciprocal and adds no energy. docs/decisions/preview-surface.md compares this program with the
+/// specification and with other renderers.
 ///
 /// A program variant (material/description/variants.h) supports only some features. For materials
 /// without other features, its results are bitwise equal to those of the complete program.
@@ -41,8 +42,8 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
   static constexpr bool kReadsIor = true;
   static constexpr bool kEmits = (kParts & kEmissionPart) != 0;
   static constexpr bool kTextured = (kParts & kTexturePart) != 0;
-  /// Inputs that may read textures. The mask has all inputs or none, because a single textured
-  /// input aligns the tangent frame with the texture.
+  /// Inputs that may read textures. The mask has either all inputs or none, because even one
+  /// textured input aligns the tangent frame with the texture.
   static constexpr uint32_t kInputs =
       !kTextured ? 0u
                  : input_bit(Input::kBaseColor) | input_bit(Input::kSpecularColor) |
@@ -231,7 +232,7 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
   }
 
  private:
-  /// Transmission of the clearcoat for light of the layers below.
+  /// Transmission of the clearcoat for light from the layers below.
   F below_coat(const Vec3<F>& wo, const Vec3<F>& wi) const {
     return F(1.f - coat_albedo(max(min(wo.z, abs(wi.z)), F(0.f))));
   }

@@ -20,7 +20,7 @@ namespace {
 
 using Point = Vec3<float>;
 
-/// Fraction of their size by which the bounds of glass are shrunk, so that a table that touches a
+/// Bounds of glass are shrunk by this fraction of their size, so that a table that touches a
 /// drinking glass does not count as inside the glass.
 constexpr float kMargin = 1e-3f;
 /// Maximum number of tests of bounds and triangles before the search gives up, which is after about
@@ -77,7 +77,8 @@ class Clipped {
     const Point size = own.hi - own.lo, whole = bounds.hi - bounds.lo;
     const bool large = std::max({size.x / whole.x, size.y / whole.y, size.z / whole.z}) > 0.1f;
     if (test(centre)) return true;
-    // Sample the triangle fan around the centre, including the rays to the corners.
+    // Sample the triangle fan around the centre, including the lines from the centre to the
+    // corners.
     const int steps = large ? 6 : 1;
     const float step = 1.f / static_cast<float>(steps);
     for (size_t i = 0; i < count_; ++i) {
@@ -114,7 +115,7 @@ struct Glass {
   Bounds bounds;  ///< in world space
   uint32_t mesh;
   const Instance* instance;
-  WideMap to_mesh;  ///< maps from world space
+  WideMap to_mesh;  ///< transform from world space
 };
 
 /// Binary tree of bounding boxes, split at the median of their centres.
@@ -252,9 +253,9 @@ class Search {
     if (!hollow) hollow = is_hollow(meshes_[mesh]);
     return *hollow;
   }
-  /// Returns whether a point is inside glass. The test follows a line from the point to infinity
-  /// and compares how often the line leaves and enters glass. Faces of the mesh instance that
-  /// contains the point are ignored.
+  /// Returns whether a point is inside glass. The test follows a line from the point to infinity,
+  /// and compares the number of times that the line leaves glass and enters glass. Faces of the
+  /// mesh instance that contains the point are ignored.
   bool is_in_glass(const Point& p, uint32_t mesh, const Instance* instance) {
     int left = 0;
     glass_->any(grown({p, p}), tests_, [&](const Glass& g) {

@@ -21,8 +21,8 @@ struct PlacedObjects {
   std::span<const MatrixStep> steps;
 };
 
-/// Predicate on materials. The result tells whether closed meshes with the material are searched
-/// for contents.
+/// Predicate on materials. Returns true if closed meshes with the material are to be searched for
+/// contents.
 using Glasses = std::vector<bool>;
 /// Calls `test` for each material and returns the results as flags.
 Glasses glasses_of(std::span<const Material> materials,
@@ -32,7 +32,7 @@ Glasses glasses_of(std::span<const Material> materials,
 /// through the glass on segments that do not end at its surface, so paths have to track a medium
 /// stack if the glass absorbs (needs_medium_stack).
 ///
-/// The test uses the first time step of mesh shapes and instance transforms at mid-shutter. Tested
+/// The test uses meshes at their first time step, and instance transforms at mid-shutter. Tested
 /// points are the vertices of curves, and a few points on the part of each triangle that lies
 /// within the bounds of the glass. If the test would take longer than about half a second, the
 /// function stops and returns true.

@@ -26,8 +26,8 @@ bool is_solid(const Material& m) {
 }
 
 /// Returns the coefficients of one colour channel as defined in OpenPBR 1.1, "Translucent base".
-/// Extinction is -ln(colour) / depth, and scattering is scatter / depth. Absorption is their
-/// difference, which may be negative in this result.
+/// Extinction is -ln(colour) / depth, and scattering is scatter / depth. Absorption is extinction
+/// minus scattering, which may be negative in this result.
 Coefficients raw_coefficients(float color, float scatter, float depth) {
   const float extinction = -std::log(std::clamp(color, kDarkestTransmission, 1.f)) / depth;
   const float scattering = std::max(scatter, 0.f) / depth;

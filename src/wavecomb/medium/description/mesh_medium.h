@@ -27,8 +27,8 @@ struct MeshMedium {
   Color<F> absorption, scattering;  ///< coefficients, per unit of length
   F anisotropy;                     ///< mean cosine of the scattering angle
   F ior;
-  /// Priority where media overlap: rays travel in the medium of the highest priority. Among equal
-  /// priorities, rays travel in the medium that they entered last.
+  /// Priority where media overlap: rays travel in the medium of the highest priority. If priorities
+  /// are equal, rays travel in the medium that they entered last.
   F priority;
   UInt<F> kind;  ///< BoundaryKind
   Vec3<F> pad, pad_too;
@@ -48,18 +48,18 @@ struct MeshMediaView {
   }
 };
 
-/// Returns whether a material is a transmissive solid with absorption by constant coefficients. A
-/// value graph may drive the transmission.
+/// Returns whether a material is a transmissive solid that absorbs light with constant
+/// coefficients. The amount of transmission may come from a value graph.
 bool is_absorbing_solid(const Material& material, const GraphSet& graphs);
 /// Returns whether a material is a transmissive solid whose absorption is driven by a value graph.
 /// The graph is evaluated at the point where a path leaves the glass, so the absorption along a ray
 /// segment depends on the direction of travel.
 bool absorbs_by_graph(const Material& material, const GraphSet& graphs);
-/// Returns whether a material needs paths to track a medium stack: it scatters inside, has a
-/// priority, or bounds an absorbing medium without refraction. If `absorbing` is set, any absorbing
-/// medium needs a medium stack. Set `absorbing` for scenes in which ray segments inside a solid
-/// need not end at its surface: scenes with volumes, and scenes with objects inside absorbing glass
-/// (medium/description/glass_contents.h).
+/// Returns whether paths must track a medium stack because of a material: the material scatters
+/// inside, has a priority, or bounds an absorbing medium without refraction. If `absorbing` is set,
+/// any absorbing medium needs a medium stack. Set `absorbing` for scenes in which ray segments
+/// inside a solid need not end at its surface: scenes with volumes, and scenes with objects inside
+/// absorbing glass (medium/description/glass_contents.h).
 bool needs_medium_stack(const Material& material, const GraphSet& graphs, bool absorbing);
 /// Appends the material that shades collisions inside meshes, and returns its index. If no material
 /// needs a medium stack, appends nothing and returns kInheritMaterial.

@@ -49,9 +49,9 @@ float single_albedo(float color, float anisotropy);
 /// Returns the diffusion length of a medium, in mean free paths, from 1.02 to 100. For isotropic
 /// scattering with albedo a, the diffusion length is
 ///   1 / sqrt(1 - a^(2.44294 - 0.0215813 a + 0.578637 / a))
-/// (d'Eon and Krivanek, "Zero-Variance Theory for Efficient Subsurface Scattering", 2020). An
-/// anisotropic medium has the diffusion length of its equivalent isotropic medium by similarity
-/// theory.
+/// (d'Eon and Krivanek, "Zero-Variance Theory for Efficient Subsurface Scattering", 2020). By
+/// similarity theory, an anisotropic medium has the same diffusion length as an equivalent
+/// isotropic medium.
 double diffusion_length(double albedo, double anisotropy);
 
 /// Device view of all media for subsurface random walks.

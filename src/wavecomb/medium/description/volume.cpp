@@ -12,7 +12,8 @@
 namespace wavecomb {
 namespace {
 
-/// Returns the map from the bricks of a grid, or from the unit cube of the box, to the world.
+/// Returns the map to world space from the bricks of a grid or, for a homogeneous volume, from the
+/// unit cube.
 WideMap bricks_to_world(const Volume& v, const VolumeField& field) {
   if (field.grid) return WideMap(v.to_world).after(bricks_to_object(field));
   const Vec3<float> size = v.box[1] - v.box[0];
@@ -45,7 +46,7 @@ TransformedGrid transform_cells(const Volume& v, const VolumeField& field,
   return transformed;
 }
 
-/// Returns the transforms for looking up a moving field at points of a space. `to_bricks` maps the
+/// Returns the transforms for lookups of a moving field at points of a space. `to_bricks` maps the
 /// space to bricks of the field.
 FieldDrift drift_of(const Volume& v, const VolumeField& field, const WideMap& to_bricks) {
   const WideMap object = bricks_to_object(field);

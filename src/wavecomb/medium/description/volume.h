@@ -17,11 +17,11 @@ namespace wavecomb {
 /// faces, so that a trilinear lookup reads a single brick.
 inline constexpr uint32_t kBrickEdge = 8, kBrickRow = kBrickEdge + 1,
                           kBrickVoxels = kBrickRow * kBrickRow * kBrickRow;
-/// Value in the table of a grid for a cell that has no brick.
+/// Entry in the table of a grid for a cell without a brick.
 inline constexpr uint32_t kNoBrick = 0xffffffffu;
 
-/// Device view of a grid. The unit of the grid's space is one brick, and the table of bricks covers
-/// [0, size).
+/// Device view of a grid. In the grid's space, a brick has edge length 1, and the table of bricks
+/// covers [0, size).
 struct GridView {
   const uint32_t* table = nullptr;  ///< brick number of each cell, x fastest, or kNoBrick
   /// For each cell, the largest value of any component that a lookup in the cell can return.
@@ -34,7 +34,7 @@ struct GridView {
   float background = 0;  ///< value outside all bricks
 };
 
-/// Voxels from which a VolumeGrid is made, in bricks of 8^3 voxels, as volume files store them.
+/// Input voxels of a VolumeGrid, in bricks of 8^3 voxels, as volume files store them.
 struct GridBricks {
   std::string name;                  ///< used in messages
   std::span<const int32_t> origins;  ///< x, y, z of the first voxel of each brick, multiples of 8
@@ -51,8 +51,8 @@ struct GridBricks {
 class VolumeGrid {
  public:
   /// Makes a grid. Throws Error if a value is not finite, if a value of an unsigned grid is
-  /// negative, if bricks are duplicate, if an origin is not a multiple of 8, or if the grid needs
-  /// more than 32-bit indices.
+  /// negative, if two bricks have the same origin, if an origin is not a multiple of 8, or if the
+  /// grid needs more than 32-bit indices.
   explicit VolumeGrid(const GridBricks& bricks);
 
   GridView view() const;
@@ -143,8 +143,8 @@ struct VolumeRecord {
   float anisotropy;
   bool is_grey;  ///< extinction is the same in all channels
   bool emits;
-  /// Whether the volume moves. Tracking then uses density_cells and emission_cells, whose bounds
-  /// include all values that move through a cell during the shutter interval.
+  /// Whether the volume moves. Tracking then uses density_cells and emission_cells. The bounds of
+  /// each cell include all values that move through the cell during the shutter interval.
   bool moves;
 
   TransformedGrid density_cells, emission_cells;  ///< without a table

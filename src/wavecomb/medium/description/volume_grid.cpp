@@ -61,7 +61,7 @@ class BrickSource {
       }
     }
     /// Returns the bits of component `c` of voxel (x, y, z) of the cell, with indices from 0 to
-    /// kBrickRow - 1. The bits of values of the same sign are ordered as their magnitudes.
+    /// kBrickRow - 1. Among values of the same sign, larger magnitudes have larger bits.
     uint32_t bits(uint32_t x, uint32_t y, uint32_t z, uint32_t c) const {
       const uint32_t brick = near_[x / kBrickEdge | y / kBrickEdge << 1 | z / kBrickEdge << 2];
       if (brick == kNoBrick) return background_;
@@ -103,7 +103,7 @@ void check_values(const GridBricks& b) {
                 "' has a background that is negative or not finite; fix the file");
 }
 
-/// Throws Error unless the array sizes of a grid match its number of bricks and components.
+/// Throws Error if the array sizes of a grid do not match the number of bricks and components.
 void check_layout(const GridBricks& b, const std::string& name) {
   const size_t count = b.origins.size() / 3;
   if (b.components != 1 && b.components != 3)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Implementation of VolumeMotion. A lookup at point p and time t reads a field at p - v(p) t. The
-/// velocities v in a cell have bounds, so all lookups from the cell read points within a box. The
+/// velocities v in a cell are bounded, so all lookups from the cell read points within a box. The
 /// field's maximum over this box bounds the values of these lookups. Maxima over boxes are read
 /// from tables of maxima over 2^3, 4^3, ... cells.
 #include "wavecomb/medium/description/volume_motion.h"
@@ -18,8 +18,8 @@ namespace {
 /// Maximum number of bounding cells of a field. If more cells would be needed, the cells are made
 /// larger.
 constexpr double kMaxCells = 1 << 22;
-/// Rounding tolerance of kernels, in bricks. This tolerance keeps the box of a cell without motion
-/// from reaching into neighbouring cells.
+/// Rounding tolerance of kernels, in bricks. This tolerance prevents the box of a cell without
+/// motion from reaching into neighbouring cells.
 constexpr double kBrickSlack = 1e-5;
 
 struct WideBox {
@@ -208,8 +208,8 @@ class MovedField {
     }
     return out;
   }
-  /// Returns the cells of the space that the field can reach: its table, and the space beyond in
-  /// which velocities are not 0.
+  /// Returns the cells of the space that the field can reach: its table, and the space outside the
+  /// table in which velocities are not 0.
   MovedCells space() const {
     const WideBox displacement = drift_in(velocity_.within(velocity_.table()));
     const WideBox windy = image_of(from_velocity_, velocity_.table());

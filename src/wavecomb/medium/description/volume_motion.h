@@ -11,7 +11,7 @@
 
 namespace wavecomb {
 
-/// Bounding cells of a moving field: cubes that cover the space that the field can reach, in units
+/// Bounding cells of a moving field. These cubes cover the space that the field can reach, in units
 /// of the field's bricks.
 struct MovedCells {
   std::array<double, 3> first{};   ///< lower corner, in bricks of the field
@@ -23,8 +23,8 @@ struct MovedCells {
   WideMap to_bricks() const { return {{first[0], first[1], first[2]}, edge}; }
 };
 
-/// Bounds of the fields of a volume over the shutter interval, the same for all transforms of the
-/// volume. Immutable.
+/// Bounds of the fields of a volume over the shutter interval. The bounds do not depend on the
+/// volume's transform. Immutable.
 class VolumeMotion {
  public:
   /// Computes the bounds of a volume that moves (Volume::moves) and has a density grid.
@@ -39,7 +39,7 @@ class VolumeMotion {
   MovedCells density_, emission_;
 };
 
-/// Returns whether the motion bounds of volume `a` are valid for volume `b` as well.
+/// Returns whether the motion bounds of volume `a` are also valid for volume `b`.
 bool has_same_motion(const Volume& a, const Volume& b);
 
 /// Maps bricks of a field to the volume's local space.

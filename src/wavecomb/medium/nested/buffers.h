@@ -10,8 +10,8 @@ namespace wavecomb {
 
 /// Buffers of a worker; empty if the scene has no nested dielectrics.
 struct NestedMediaBuffers {
-  static constexpr size_t kWords = 32;    ///< 32-bit words per ray
-  static constexpr size_t kColumns = 16;  ///< 32-bit words per traced ray
+  static constexpr size_t kWords = 32;    ///< row size of a ray, in 32-bit words
+  static constexpr size_t kColumns = 16;  ///< number of columns of traced rays
 
   explicit NestedMediaBuffers(size_t capacity)
       : rows(capacity ? SoaBlock(1, capacity * kWords) : SoaBlock()),

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Medium stack of a path: the medium boundaries (meshes) that it has entered and not left (Schmidt
-/// and Budge, "Simple Nested Dielectrics in Ray Traced Images", 2002). Where several meshes
-/// overlap, the medium of the mesh with the highest priority applies, and among equal priorities
-/// that of the last mesh entered.
+/// Medium stack of a path: the medium boundaries (meshes) that the path has entered and not left
+/// (Schmidt and Budge, "Simple Nested Dielectrics in Ray Traced Images", 2002). Where several
+/// meshes overlap, the medium of the mesh with the highest priority applies, and if priorities are
+/// equal, the medium of the mesh that was entered last.
 #pragma once
 
 #include "wavecomb/core/math.h"
@@ -11,8 +11,8 @@
 
 namespace wavecomb {
 
-/// Maximum number of entries in a medium stack. A further entry replaces the boundary that was
-/// entered first.
+/// Maximum number of entries in a medium stack. If the stack is full, a new entry replaces the
+/// boundary that was entered first.
 inline constexpr size_t kMaxMediumStack = 4;
 /// Material id of an empty entry of the stack.
 inline constexpr uint32_t kNoMaterial = 0xffffffffu;
@@ -76,7 +76,7 @@ class MediumStack {
     }
   }
 
-  /// Returns the entry with the highest priority, whose medium the path is in.
+  /// Returns the entry with the highest priority. The path is in the medium of this entry.
   MediumBoundary<F> top(const MeshMediaView& view, const Mask<F>& active) const {
     MediumBoundary<F> best{U(kNoMaterial), U(kNoMaterial)};
     F most(-kInfinity);
@@ -170,7 +170,7 @@ inline BoundaryHit<F> cross_boundary(const MeshMediaView& view, const MediumStac
   const U kind = gather_field<F>(view.media, &MeshMedium<float>::kind, bound.material, lanes);
   const Mask<F> clear =
       Mask<F>(kind == U(static_cast<uint32_t>(BoundaryKind::kClear))) & (hit.outer == 1.f);
-  // A boundary that a ray leaves without having entered the mesh stays visible.
+  // Priorities do not hide the boundary of a mesh that a ray leaves without having entered it.
   hit.passes =
       lanes & (clear | (same(current, top_after) & (enters | before.contains(bound.object))));
   return hit;

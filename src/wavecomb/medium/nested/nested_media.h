@@ -3,13 +3,13 @@
 ///
 /// A ray through media k with absorption a_k and scattering s_k, over lengths t_k, has throughput
 ///   *= exp(-sum a_k t_k) and collides after an exponentially distributed optical depth of
-///   scattering, which a hero channel samples (medium/volume/tracking.h). Each medium is
-///   homogeneous, so a new distance is sampled where a medium begins. With
-///   equiangular sampling, the distance is sampled after the next boundary or surface was found.
+///   scattering, which a hero channel samples (medium/volume/tracking.h). Since each
+///   medium is homogeneous, a new distance is sampled wherever a ray enters a medium. With
+///   equiangular sampling, the distance is sampled after the next boundary or surface is found.
 ///
 /// Scattering behind a refractive boundary skips light sampling, since no shadow ray can reach a
 /// light, and continues as a random walk. Where the random walk hits a surface, the path continues
-/// normally, with MIS weight 1 for emission at that surface. Scattering inside a clear boundary,
+/// as usual, and emission of this surface has MIS weight 1. Scattering inside a clear boundary,
 /// which does not refract, is an event with light sample, bounce and MIS, as in volumes.
 #pragma once
 
@@ -25,12 +25,12 @@ namespace wavecomb {
 
 /// Traces the rays of a wave through the media inside meshes.
 ///
-/// Contract: the random numbers of a ray depend only on that ray, so that neither order nor lane
-/// width has an effect.
+/// Contract: the random numbers of a ray depend only on that ray, so that neither the order of rays
+/// nor the lane width affects the result.
 class NestedMedia {
  public:
-  /// `counts` receives the number of traced rays, as steps of random walks. `equiangular` selects
-  /// equiangular sampling of distances in fog (equiangular.h).
+  /// `counts` receives the number of traced rays, counted as steps of random walks. `equiangular`
+  /// selects equiangular sampling of distances in fog (equiangular.h).
   NestedMedia(const SceneView& scene, const EmbreeAccelerator& accel, uint32_t width,
               const NestedMediaBuffers& buffers, Counts& counts, bool equiangular)
       : scene_(scene),
@@ -40,13 +40,13 @@ class NestedMedia {
         b_(buffers),
         counts_(counts) {}
 
-  /// Returns the medium stack at a point. `keys` are the presence keys of any path.
+  /// Returns the medium stack at a point. `keys` may be the presence keys of any path.
   MediumStack<float> stack_at(Vec3<float> p, float time, PresenceKeys keys) const;
 
-  /// Traces all rays to the event or surface that stops them. `hits` holds the rays' first hits,
-  /// and on return the hits at which the rays end. `around` is the medium stack at the camera for
-  /// new paths, or null for paths that continue. start(i, path) returns the NestedRayStart of the
-  /// packet at i.
+  /// Traces all rays to the event or surface that stops them. On entry, `hits` holds the first hits
+  /// of the rays, and on return the hits at which the rays end. `around` is the medium stack at the
+  /// camera for new paths, or null for paths that continue. start(i, path) returns the
+  /// NestedRayStart of the packet at i.
   template <typename F, typename Start>
   void sample_flight(const NestedRays& rays, const HitSpan& hits, const NestedEvents& events,
                      const MediumStack<float>* around, PresenceKeys keys, const Start& start) const;
@@ -101,14 +101,14 @@ class NestedMedia {
     counts_.walk_steps += n;
   }
 
-  /// Returns the lanes of a packet for whose rays an object (instance_geometry()) is visible. The
-  /// object must be visible to this kind of ray. For a shadow ray, the light's shadow linking must
-  /// also include the object. An object that is invisible to a ray neither stops nor attenuates the
-  /// ray, but the ray still enters and leaves the object's medium.
+  /// Returns the lanes of a packet in which the ray can see an object (instance_geometry()). The
+  /// object must be visible to rays of this kind and, for a shadow ray, included in the light's
+  /// shadow linking. An object that is invisible to a ray neither stops nor attenuates the ray, but
+  /// the ray still enters and leaves the object's medium.
   template <typename F>
   Mask<F> is_visible(const Rays<F>& r, const UInt<F>& object, const Mask<F>& lanes) const;
-  /// Returns the medium inside a boundary. The medium is empty in lanes for whose rays the boundary
-  /// is invisible.
+  /// Returns the medium inside a boundary. The medium is empty in lanes whose ray cannot see the
+  /// boundary.
   template <typename F>
   MeshMedium<F> medium_of(const Rays<F>& r, const MediumBoundary<F>& bound,
                           const Mask<F>& active) const {
@@ -131,28 +131,28 @@ class NestedMedia {
     return {select(may, max(F(at - r.s.start), F(0.f)), F(kInfinity)),
             gather<U>(events.material, r.ray_index, Mask<U>(may))};
   }
-  /// Returns the distance at which a ray continues past a hit at t that neither stops it nor bounds
-  /// a medium. The step is just above rounding error, since a medium boundary may follow closely.
-  /// If the ray then hits the same surface again, only time is lost.
+  /// Returns the distance at which a ray continues after a hit at t that neither stops the ray nor
+  /// bounds a medium. The step is just above rounding error, since a medium boundary may follow
+  /// closely. If the ray then hits the same surface again, this costs time but does not change the
+  /// result.
   template <typename F>
   F past_hit(const F& t) const {
     return fma(t, F(1.f + 0x1p-20f), F(scene_.scale * 0x1p-21f));
   }
-  /// Returns what the rays of the packet hit. In lanes whose ray passes through a boundary, `r.s`
-  /// and `stack` are updated to the other side.
+  /// Returns the hits of the rays in the packet. In lanes whose ray passes through a boundary,
+  /// `r.s` and `stack` are updated to the other side.
   template <typename F>
   BoundaryHits<F> intersect_boundary(Rays<F>& r, MediumStack<F>& stack,
                                      const MediumBoundary<F>& current, const Mask<F>& lanes) const;
-  /// Returns the lanes in whose medium distances are sampled by equiangular sampling.
+  /// Returns the lanes in which distances are sampled by equiangular sampling.
   template <typename F>
   static Mask<F> is_lit(const MeshMedium<F>& m) {
     return Mask<F>(m.kind == UInt<F>(static_cast<uint32_t>(BoundaryKind::kClear))) &
            (max_component(m.scattering) > 0.f);
   }
   /// Samples the distance to the next collision with the random number `u`. In a medium without
-  /// scattering, no distance is sampled, and the random number for the first distance is kept for
-  /// the next medium. With equiangular sampling, `u` is stored until the length of the segment is
-  /// known.
+  /// scattering, no distance is sampled, and the next medium uses the random number of the first
+  /// distance. With equiangular sampling, `u` is stored until the length of the segment is known.
   template <typename F>
   void sample_distance(Rays<F>& r, const MediumStack<F>& stack, const F& u,
                        const Mask<F>& lanes) const;

@@ -11,7 +11,7 @@ namespace wavecomb {
 
 /// Rays of a wave in columns, and the rows of their paths.
 struct NestedRays {
-  float *o[3], *d[3];    ///< updated if a path has scattered
+  float *o[3], *d[3];    ///< updated if the path scatters
   const uint32_t* slot;  ///< row of each path
   size_t size;
   const float* times;  ///< shutter times; null without motion
@@ -21,8 +21,8 @@ struct NestedRays {
 
 /// Volume events and collisions that stop the rays, with the weights of Flights, and the
 /// transmittance due to absorption. If `limited` is set, `t` and `material` initially hold the
-/// volume event that stops each ray. The event of a ray is dropped once the ray has scattered in a
-/// mesh medium; its hero channel becomes kNoHero.
+/// volume event that stops each ray. Once a ray has scattered in a mesh medium, its event is
+/// dropped and its hero channel becomes kNoHero.
 struct NestedEvents {
   bool limited;
   float* t;
@@ -73,7 +73,7 @@ struct NestedRayState {
   UInt<F> seed, number, hero, flags;
   WAVECOMB_FIELDS(o, d, throughput, start, first, rest, seed, number, hero, flags)
 };
-/// Medium stack of a ray, and its attenuation since the last collision.
+/// Medium stack and attenuation of a ray since the last collision.
 template <typename F>
 struct NestedRayMedia {
   UInt<F> object_0, object_1, object_2, object_3, material_0, material_1, material_2, material_3;
@@ -91,13 +91,13 @@ struct NestedRayHit {
 /// Packet of rays.
 template <typename F>
 struct NestedRayPacket {
-  UInt<F> ray_index;  ///< index among all rays
+  UInt<F> ray_index;  ///< index of each ray in the wave
   Mask<F> active;
   NestedRayState<F> s;
   NestedRayMedia<F> l;
   NestedRayHit<F> hit;
   uint32_t kind = kVisibleToAll;  ///< RayVisibility of the rays
-  UInt<F> shadow_set{0u};         ///< ShadowRow::set of shadow rays; 0 if all objects block them
+  UInt<F> shadow_set{0u};  ///< ShadowRow::set of shadow rays; 0 if all objects block shadow rays
 };
 /// Hits of a packet of rays: lanes that hit a surface, lanes whose surface bounds a medium, and
 /// lanes whose ray passes through.

@@ -19,7 +19,7 @@ inline Mask<F> NestedMedia::is_visible(const Rays<F>& r, const UInt<F>& object,
   const LinkView& links = scene_.lights.links;
   const Mask<F> linked = visible & Mask<F>(r.shadow_set != U(0u));
   if (!links.members || none(linked)) return visible;
-  // Test whether the object casts a shadow, as casts_shadow() in accel/presence.h does.
+  // Test whether the object casts a shadow, like casts_shadow() in accel/presence.h.
   const U set = select(Mask<U>(linked), r.shadow_set, U(1u)) - 1u;
   const U link = gather<U>(links.classes, object, Mask<U>(linked));
   const U word = gather<U>(links.members, (link - 1u) * links.words + (set >> 5), Mask<U>(linked));
@@ -161,7 +161,7 @@ inline size_t NestedMedia::advance(const NestedRays& all, const HitSpan& hits,
   const Mask<F> collides = r.active & not_(stopped) & (s.rest < far);
   const F length = select(collides, s.rest, far);
 
-  // Densities relative to the colour channel with the least scattering, to avoid overflow.
+  // Compute densities relative to the colour channel with the least scattering, to avoid overflow.
   const Color<F>&a = medium.absorption, &b = medium.scattering;
   const F least = min(b.x, min(b.y, b.z)), most = max(max_component(b), F(1e-30f));
   const auto density = [&](const F& scattering) {

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Subsurface random walks in homogeneous media, collision by collision.
 ///
-/// A walk begins where a diffuse lobe enters a subsurface body (OpenPbrBsdf::enters) and ends where
-/// it hits the surface of the same object from inside. At the exit point the path continues as at a
-/// white diffuse surface that is seen from outside, with a light sample and a bounce. Light is not
-/// refracted at the entry or exit point. Uniform incident light therefore leaves uniformly, and a
-/// flat surface has the requested colour (medium/description/subsurface.h).
+/// A walk begins where a diffuse lobe enters a subsurface body (OpenPbrBsdf::enters). The walk ends
+/// where it hits the surface of the same object from inside. At the exit point the path continues
+/// as at a white diffuse surface that is seen from outside, with a light sample and a bounce. Light
+/// is not refracted at the entry or exit point. Uniform incident light therefore leaves uniformly,
+/// and a flat surface has the requested colour (medium/description/subsurface.h).
 ///
 /// Techniques: each walk has a hero channel, which determines its distances (hero wavelengths,
 /// Wilkie et al. 2014), and is either free or guided. A free walk follows the medium's phase
-/// function. A guided walk prefers directions back to the surface where it entered (Krivanek and
+/// function. A guided walk prefers directions back to its entry point on the surface (Krivanek and
 /// d'Eon, "A Zero-Variance-Based Sampling Scheme for Monte Carlo Subsurface Scattering", 2014):
 /// with n the normal there, mu = d n, and nu the diffusion length in mean free paths, it samples
 ///
@@ -38,7 +38,7 @@
 namespace wavecomb {
 
 /// Number of collisions after which a walk survives each further collision only with probability
-/// 1/2. This roulette guarantees that walks end, and does not change the mean.
+/// 1/2. This roulette guarantees that walks end, without changing the mean.
 inline constexpr uint32_t kLongWalk = 512;
 /// Fraction of the initial light below which a walk is subject to roulette.
 inline constexpr float kFaintWalk = 0.25f;
@@ -98,9 +98,9 @@ template <typename F, typename Function>
 inline Color<F> each_channel(const Color<F>& a, const Color<F>& b, const Function& f) {
   return {f(a.x, b.x), f(a.y, b.y), f(a.z, b.z)};
 }
-/// Multiplies the densities of all techniques by their densities for one step of the walk, `free`
-/// and `guided`, and updates the weight of the walk. `through` is the factor of the step on the
-/// carried light.
+/// Multiplies the density of each technique by the technique's density for one step of the walk,
+/// `free` or `guided`, and updates the weight of the walk. `through` is the factor by which the
+/// step attenuates the light.
 template <typename F>
 inline void weigh_step(const Color<F>& free, const Color<F>& guided, const Color<F>& through,
                        SubsurfaceWalk<F>& w) {
@@ -123,8 +123,8 @@ inline Color<F> guided_density(const SubsurfaceMedium<F>& medium, const Subsurfa
 }  // namespace detail
 
 /// Selects the technique of a walk that enters a body. `across` is the thickness of the object
-/// along the ray. Channels are selected by the light that a thick body would reflect. Few walks are
-/// guided if the body is thin or scattering is anisotropic.
+/// along the ray. Channels are selected in proportion to the light that a thick body would reflect.
+/// Few walks are guided if the body is thin or scattering is anisotropic.
 template <typename F>
 inline void choose_technique(const SubsurfaceMedium<F>& medium, const F& across,
                              SubsurfaceWalk<F>& w) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Subsurface random walks of a wave. In each iteration, all walks take one step. The walks that
-/// continue are then stored contiguously, so that SIMD lanes stay full.
+/// Subsurface random walks of a wave. In each iteration, all walks take one step. The remaining
+/// walks are then stored contiguously, so that SIMD lanes stay full.
 #pragma once
 
 #include "wavecomb/accel/embree_accelerator.h"
@@ -22,8 +22,8 @@ struct WalkEnd {
 
 /// Queue of subsurface random walks, stored in columns of a memory block that the caller owns.
 ///
-/// Contract: the random numbers of a walk depend only on that walk, so that neither order nor lane
-/// width has an effect.
+/// Contract: the random numbers of a walk depend only on that walk, so that neither the order of
+/// walks nor the lane width affects the result.
 class WalkQueue {
  public:
   static constexpr size_t kColumns = 36;
@@ -34,16 +34,16 @@ class WalkQueue {
   static constexpr uint32_t kNoMedium = 0xffffffffu;
 
   /// Adds the walks in the active lanes. `slot` is the slot of the path. run() passes `ray_index`
-  /// to its callback `finish`.
+  /// on to its callback `finish`.
   template <typename F>
   void add(const SubsurfaceWalk<F>& w, const UInt<F>& ray_index, const UInt<F>& slot, const F& time,
            const Mask<F>& active) {
     size_ += put<F>(size_, {w, ray_index, slot, UInt<F>(kNoMedium), time}, active);
   }
 
-  /// Starts the added walks. medium_of(inst, geom, prim, met) returns the material of the surface
-  /// that a walk's first ray hits on its object, or kNoMedium. `keys` specify the objects. Calls
-  /// leave(lanes, slot) for paths that do not start a walk.
+  /// Starts the added walks. medium_of(inst, geom, prim, met) returns the material at the point
+  /// where a walk's first ray hits the walk's object, or kNoMedium. `keys` specify the objects.
+  /// Calls leave(lanes, slot) for paths that do not start a walk.
   template <typename F, typename MediumOf, typename Leave>
   void enter(const SceneView& scene, const EmbreeAccelerator& accel, uint32_t width,
              const PresenceKeys& keys, const MediumOf& medium_of, const Leave& leave) {
@@ -182,7 +182,7 @@ class WalkQueue {
             number(kMaterial),
             real(kTime)};
   }
-  /// Stores the active lanes contiguously from `i` on, and returns their number. The function
+  /// Stores the active lanes contiguously, starting at `i`, and returns their number. The function
   /// writes whole packets, so up to one packet of entries after the stored walks may be
   /// overwritten.
   template <typename F>

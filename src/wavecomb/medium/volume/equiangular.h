@@ -7,9 +7,10 @@
 /// from a point c on a light,
 ///   e(x) = D / ((b - a) (D^2 + (x - delta)^2)),
 /// where D is the distance of c from the ray, delta the position closest to c, and a and b the
-/// angles at which c sees the ends of the medium. Both densities and their integrals have closed
-/// forms. Samples of both techniques, and passing the medium without a collision, are therefore
-/// weighted exactly (balance heuristic). q and c depend only on the ray segment.
+/// angles of the ends of the medium as seen from c. The densities of both techniques and their
+/// integrals have closed forms. Samples of both techniques, and passing the medium without a
+/// collision, are therefore weighted exactly (balance heuristic). q and c depend only on the ray
+/// segment.
 #pragma once
 
 #include "wavecomb/core/math.h"
@@ -81,8 +82,8 @@ inline EquiangularDistribution<F> equiangular_distribution(const LightView& ligh
   distribution.span = max(
       F(atan2(F(end - distribution.nearest), distribution.height) - distribution.from), F(1e-6f));
   // The probability q is proportional to the angle that the segment subtends from the light. It is
-  // also proportional to the transmittance from `begin` via the point closest to the light to the
-  // light.
+  // also proportional to the transmittance along the ray from `begin` to the point closest to the
+  // light, and from there to the light.
   const F before = clamp(F(distribution.nearest - begin), F(0.f), length);
   const F q = F(kMaxEquiangular / kPi) * distribution.span *
               exp(F(-extinction * (before + distribution.height)));
@@ -90,10 +91,10 @@ inline EquiangularDistribution<F> equiangular_distribution(const LightView& ligh
   return distribution;
 }
 
-/// Probability, for one colour channel, that a ray travels the length `x` in a homogeneous medium
-/// and stops at distance `at` along the ray. `exact` is the physical probability, and `sampled` the
-/// probability of the sampling technique with the channel as hero. In lanes where a collision
-/// `stopped` the ray, the values are densities over distance.
+/// For one colour channel, the probability that a ray travels the length `x` in a homogeneous
+/// medium and stops at distance `at` along the ray. `exact` is the physical probability, and
+/// `sampled` the probability of the sampling technique with the channel as hero. In lanes where a
+/// collision `stopped` the ray, the values are densities over distance.
 template <typename F>
 struct OutcomeDensity {
   F exact, sampled;

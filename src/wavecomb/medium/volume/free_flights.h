@@ -15,14 +15,14 @@ struct Flights {
 
   float* t;
   uint32_t* material;  ///< material of the volume that stopped the flight
-  /// Probability of the outcome by channel, divided by that of the hero channel.
+  /// Probability of the outcome in each channel, divided by the probability in the hero channel.
   float* ratio[3];
-  const uint32_t* hero;  ///< the channel that samples the distance
-  /// Additional factor of the weight by channel, for outcomes that the hero channel did not sample.
-  /// Initially 1.
+  const uint32_t* hero;  ///< channel whose extinction determines the sampled distance
+  /// Additional factor of the weight of each channel, for outcomes that the hero channel did not
+  /// sample. Initially 1.
   float* scale[3];
 };
-/// Which results of the free flights through a volume to compute.
+/// Results of free flights that a call computes: the stops, the ratios, or both.
 enum class FlightResults : uint8_t { kStops, kRatios, kBoth };
 
 /// Selects the hero channel, in proportion to the throughput.

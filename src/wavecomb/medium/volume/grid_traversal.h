@@ -66,7 +66,8 @@ class GridTraversal {
 
   /// Returns the lanes whose rays have not reached their end.
   const Mask<F>& on() const { return on_; }
-  /// Returns the current distance. leave() is the distance at which a lane leaves its cell or ends.
+  /// Returns the current distance. leave() returns the distance at which a lane leaves its cell or
+  /// ends.
   const F& x() const { return x_; }
   F leave() const { return max(x_, min(min(next_[0], next_[1]), min(next_[2], end_))); }
   /// Returns the largest value of the grid in the current cell.

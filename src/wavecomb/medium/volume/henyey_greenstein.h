@@ -7,7 +7,7 @@
 
 namespace wavecomb {
 
-/// Mean cosines of smaller magnitude count as 0, in densities and in samples.
+/// Mean cosines of smaller magnitude are treated as 0, both in densities and in samples.
 inline constexpr float kMinMeanCosine = 1e-3f;
 
 /// Returns the solid angle density for the cosine `c` between the propagation directions before and

@@ -44,7 +44,7 @@ struct HomogeneousSegments {
 
 }  // namespace detail
 
-/// Samples free flights through a homogeneous volume, including by equiangular sampling
+/// Samples free flights through a homogeneous volume, with equiangular sampling where possible
 /// (equiangular.h). `segments.most` is the original length of each segment, before any volume
 /// stopped it, so that repeated calls get the same equiangular distribution. With kStops, the
 /// function samples where flights stop. With kRatios, it computes the weights, after all volumes

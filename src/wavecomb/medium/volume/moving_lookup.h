@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Lookup of volume fields at the shutter time of a ray. The value of a moving field at the point p
-/// is the value of its grid at p - v(p) t. v is the velocity at p, and t is the time in seconds
-/// relative to the time of the grids.
+/// Lookup of volume fields at the shutter time of a ray. A moving field has, at the point p, the
+/// value of its grid at p - v(p) t. v is the velocity at p, and t is the time in seconds relative
+/// to the time of the grids.
 ///
 /// In a moving volume, rays traverse cells that bound the field over the whole shutter interval
 /// (medium/description/volume_motion.h). In a static volume, rays traverse the cells of the field's
@@ -12,11 +12,11 @@
 
 namespace wavecomb {
 
-/// Returns the grid whose cells rays traverse to sample the density of a volume.
+/// Returns the grid that rays traverse to sample the density of a volume.
 inline const TransformedGrid& extinction_cells(const VolumeRecord& v) {
   return v.moves ? v.density_cells : v.density;
 }
-/// Returns the grid whose cells rays traverse to sample the emission of a volume.
+/// Returns the grid that rays traverse to sample the emission of a volume.
 inline const TransformedGrid& emission_cells(const VolumeRecord& v) {
   return v.moves ? v.emission_cells : v.emission_field;
 }
@@ -27,7 +27,7 @@ inline F seconds_at(const VolumeRecord& v, const F& time) {
   return fma(time, F(v.seconds_span), F(v.seconds_open));
 }
 
-/// Returns the position in the grid of a moving field, in bricks, whose value moves to the point
+/// Returns the grid position, in bricks, from which a moving field's value has moved to the point
 /// `p`.
 template <typename F>
 inline Vec3<F> drifted(const FieldDrift& drift, const GridView& velocity, const Vec3<F>& p,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Traversal of one volume by many ray segments. A lane that has finished a segment continues with
-/// the next segment.
+/// Traversal of one volume by many ray segments. When a lane has finished a segment, it continues
+/// with the next unprocessed segment.
 #pragma once
 
 #include "wavecomb/core/encoding/hash.h"
@@ -24,7 +24,7 @@ struct RaySegments {
   const float *ox, *oy, *oz, *dx, *dy, *dz;
   const float* most;
   const uint32_t* seed;  ///< seed for the random numbers of each segment
-  const float* first;    ///< random number in [0, 1) of the first distance in the first volume
+  const float* first;    ///< random number in [0, 1) for the first distance in the first volume
   size_t count;
   const float* times = nullptr;  ///< shutter times; null without motion
 };
@@ -68,8 +68,9 @@ inline UInt<F> ranks(const Mask<F>& lanes) {
 }  // namespace detail
 
 /// Follows ray segments from one tentative collision (real or null) to the next. Idle lanes take
-/// new segments when three eighths of the lanes are idle. Refilling at a quarter keeps more lanes
-/// busy, but takes longer in total. `Visitor` has these functions for the segments of the lanes:
+/// new segments when three eighths of the lanes are idle. With a threshold of one quarter, more
+/// lanes are busy, but the total time is longer. `Visitor` has these functions for the segments of
+/// the lanes:
 ///
 ///   start(way, lanes)    begins these segments
 ///   Mask<F> collide(lanes, x, p, majorant, numbers)    handles a collision at o + x d, at the
@@ -77,7 +78,7 @@ inline UInt<F> ranks(const Mask<F>& lanes) {
 ///                        p of the grid's space, and returns the lanes that end there
 ///   finish(way, lanes)   ends these segments
 ///
-/// The result of a ray segment does not depend on the other ray segments.
+/// The result of a ray segment does not depend on any other ray segment.
 template <typename F, typename Visitor>
 inline void each_collision(const TransformedGrid& transformed, float scale, uint32_t volume,
                            const RaySegments& segments, VolumeCounts& counts, Visitor& visitor) {

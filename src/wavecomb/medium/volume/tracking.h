@@ -8,7 +8,7 @@
 /// used, since the minimum of independent exponential distances is exponential with the sum of
 /// their rates.
 ///
-/// The random numbers of collision i in volume v are hashes of the path's random numbers, v and i,
+/// The random numbers of collision i in volume v are hashes of v, i and the path's random numbers,
 /// so that the order of processing has no effect.
 #pragma once
 
@@ -41,7 +41,7 @@ struct SegmentRandom {
 
 namespace detail {
 
-/// Time in seconds, for each lane, at which a visitor looks up a moving volume.
+/// Time in seconds at which a visitor looks up a moving volume, one for each lane.
 template <typename F>
 class SegmentSeconds {
  public:
@@ -172,10 +172,10 @@ inline void sample_stops(const VolumeView& volumes, const RaySegments& segments,
       detail::sample_flights_in<F>(volumes, i, segments, flights, FlightResults::kStops, counts);
 }
 
-/// Computes the ratios of flights whose final stops are known. In volumes other than the volume
-/// that stopped a flight, the flight may have gone further than its stop. There the flight is
-/// repeated up to the stop, with the same random numbers. In the volume that stopped the flight,
-/// the flight is repeated with its original length.
+/// Computes the ratios of the flights after their final stops are known. Only one volume stops a
+/// flight; in all other volumes, the sampled flight may have gone beyond the stop. In these
+/// volumes, the flight is repeated up to the stop, with the same random numbers. In the volume that
+/// stopped the flight, the flight is repeated with its original length.
 template <typename F>
 inline void compute_flight_ratios(const VolumeView& volumes, const RaySegments& segments,
                                   const Flights& flights, float* scratch,

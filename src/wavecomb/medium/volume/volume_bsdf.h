@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Program volume: scattering in a volume, or in fog inside a mesh.
+/// Program "volume": scattering in a volume, or in fog inside a mesh.
 #pragma once
 
 #include "wavecomb/core/frame.h"
@@ -84,7 +84,8 @@ class VolumeBsdf : public BsdfTraits {
                                  v.path.medium, in_mesh),
                  g);
     }
-    // Process one volume after the other, for those lanes of the packet that are inside the volume.
+    // Process one volume after the other, each for the lanes of the packet that are inside the
+    // volume.
     for (Mask<F> rest = v.active & not_(in_mesh); any(rest);) {
       const uint32_t index = first_active<U>(volume, Mask<U>(rest));
       const VolumeRecord& r = volumes.volumes[index];

@@ -6,9 +6,9 @@
 
 namespace wavecomb {
 
-/// Estimates the radiance that one volume emits along a ray segment, from a single sampled point of
-/// the segment. The point is sampled in proportion to the grid's largest value in each cell, and
-/// the estimate includes the transmittance of all volumes up to the point.
+/// Estimates the radiance that one volume emits along a ray segment. The estimate uses a single
+/// sampled point of the segment. The point is sampled in proportion to the grid's largest value in
+/// each cell, and the estimate includes the transmittance of all volumes up to the point.
 template <typename F>
 inline Color<F> emission_of(const VolumeView& volumes, uint32_t index,
                             const SegmentRandom<F>& random, const RaySegment<F>& segment,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Subsurface random walks: from the ray that enters a body to the point where the path leaves it,
-/// for all paths of a wave together.
+/// Subsurface random walks of all paths of a wave, from the ray that enters a body to the point
+/// where the path leaves the body.
 #pragma once
 
 #include <algorithm>
@@ -33,8 +33,8 @@ class SubsurfaceScattering {
   /// segment to the hit. `keys` are the presence keys of the ray and include the object. If the
   /// walk leaves the body, sets `left_body`, and `path` and `hit` describe a ray that views the
   /// exit point from outside. Returns false if the walk was terminated inside. If the ray does not
-  /// hit the object, returns true with `path` and `hit` unchanged, except that path.pdf becomes 0,
-  /// since no light sample competes with the path.
+  /// hit the object, returns true and leaves `path` and `hit` unchanged, except that path.pdf
+  /// becomes 0, since no light sample competes with the path.
   template <typename Hit>
   bool walk(const MediumQuery<float>& p, const PresenceKeys& keys, PathState<float>& path, Hit& hit,
             bool& left_body) const {
@@ -64,8 +64,8 @@ class SubsurfaceScattering {
                           });
     return left_body;
   }
-  /// Returns the lanes, of the packet of rays from index `i` on, whose rays view the exit point of
-  /// a walk.
+  /// For the packet of rays that starts at index `i`, returns the lanes whose rays view the exit
+  /// point of a walk.
   template <typename F>
   Mask<F> left_body(const Wave& wave, size_t i) const {
     return Mask<F>(load<UInt<F>>(wave.segments.uints(kExit) + i) != UInt<F>(0u));
@@ -171,8 +171,8 @@ class SubsurfaceScattering {
     return {fma(end.d, t, end.p), -end.d, t};
   }
 
-  /// Starts walks inside the objects of `keys`. Calls leave(lanes, slot) for paths whose ray does
-  /// not hit its object, or hits a material without a subsurface medium.
+  /// Starts walks inside the objects that `keys` specify. Calls leave(lanes, slot) for paths whose
+  /// ray does not hit its object, or hits a material without a subsurface medium.
   template <typename F, typename Leave>
   void enter(WalkQueue& walk_queue, const PresenceKeys& keys, uint32_t width,
              const Leave& leave) const {

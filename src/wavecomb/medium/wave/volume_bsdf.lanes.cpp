@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0 Kernels of the shading program "volume". This file is
-// compiled once for each lane width, with WAVECOMB_LANES set to the width.
+// This file is compiled once for each lane width, with WAVECOMB_LANES set to the width.
 #include "wavecomb/medium/volume/volume_bsdf.h"
 
 #include "wavecomb/wave/kernels/shared_kernels.h"

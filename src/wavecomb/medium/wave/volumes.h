@@ -38,8 +38,8 @@ class Volumes : public SubsurfaceScattering {
 
   /// Samples the free flight of one path of the reference integrator, in scenes with nested
   /// dielectrics. `stack` is the medium stack of `path`, `keys` are the presence keys of its ray,
-  /// and `hit` is the hit of the ray. Query `p` describes the ray segment to the hit. May change
-  /// both the path and the hit.
+  /// and `hit` is the hit of the ray. Query `p` describes the ray segment to the hit. The function
+  /// may change both the path and the hit.
   template <typename Hit>
   Flight<float> sample_nested_flight(const MediumQuery<float>& p, const PresenceKeys& keys,
                                      PathState<float>& path, Hit& hit,
@@ -104,7 +104,7 @@ class Volumes : public SubsurfaceScattering {
       compute_flight_ratios<F>(volumes_, segments, flights, scratch, distance_lights_,
                                counts_.volumes);
   }
-  /// Returns the free flights of the packet of rays from index `i` on. `throughput` is the
+  /// Returns the free flights of the packet of rays that starts at index `i`. `throughput` is the
   /// throughput of their paths.
   template <typename F>
   Flight<F> flight(const Wave& wave, size_t i, const Color<F>& throughput) const {
@@ -127,7 +127,7 @@ class Volumes : public SubsurfaceScattering {
     float* most = wave.segments.floats(kDistance);
     for (size_t i = 0; i < q.size; i += kWidth<F>) {
       Mask<F> traced(load<UInt<F>>(q.occluded + i) == UInt<F>(0u));
-      // Attenuate blocked rays as well if their light has a shadow colour, since the light is then
+      // Also attenuate a blocked ray if its light has a shadow colour, since the light is then
       // tinted instead of blocked.
       if (wave.pool.shadow_tints) [[unlikely]]
         traced = traced | has_shadow_tint<F>(wave, i);
@@ -192,9 +192,9 @@ class Volumes : public SubsurfaceScattering {
           return begin_nested_flight<F>(sampler, path.key, depth, path.throughput);
         });
   }
-  /// Returns the hero channel and the random numbers with which a ray through media starts. In
+  /// Returns the hero channel and the random numbers for the start of a ray through media. In
   /// scenes without volumes, the random number of the first distance is stratified over the pixel's
-  /// samples. Otherwise volumes use the stratified number.
+  /// samples. Otherwise volumes use the stratified random number.
   template <typename F>
   NestedRayStart<F> begin_nested_flight(SamplerKind sampler, const SampleKey<F>& key,
                                         uint32_t depth, const Color<F>& throughput) const {
@@ -235,8 +235,8 @@ class Volumes : public SubsurfaceScattering {
             q.size,
             wave.times.floats(0)};
   }
-  /// Returns the lanes, of the packet of shadow rays from index `i` on, whose light has a shadow
-  /// colour.
+  /// For the packet of shadow rays that starts at index `i`, returns the lanes whose light has a
+  /// shadow colour.
   template <typename F>
   static Mask<F> has_shadow_tint(const Wave& wave, size_t i) {
     const ShadowQueue& q = wave.shadows;

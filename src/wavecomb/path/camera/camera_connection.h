@@ -8,8 +8,9 @@
 /// sample. Directions from o thus have the density |M d'|^3 / (|det M| A) over solid angle, and a
 /// surface at p, viewed at an angle with cosine cos, has the density G cos over its area, with
 ///   G = |M d'| / (|det M| A s^2);   orthographic:   |M d'| / (|det M| A).
-/// Camera rays and connections sample the lens uniformly, so its density cancels. For a latlong
-/// camera d' is a unit vector, and a pixel covers the solid angle cos(latitude) A, so
+/// Both camera rays and connections sample the lens uniformly, so the density of lens points
+/// cancels. For a latlong camera d' is a unit vector, and a pixel covers the solid angle
+/// cos(latitude) A, so
 ///   G = |M d'| / (|det M| A s^2 cos(latitude)).
 #pragma once
 
@@ -47,7 +48,7 @@ inline F from_axis(const Vec3<F>& q) {
   return sqrt(fma(q.x, q.x, F(q.z * q.z)));
 }
 
-/// Returns the density G of a point at depth s whose distance from the lens is `stretch` * s.
+/// Returns the density G of a point at depth s and at distance `stretch` * s from the lens.
 /// `spread` is s or, for a latlong camera, the distance of the point from the axis through the
 /// poles.
 template <typename F>
@@ -87,8 +88,8 @@ struct CameraConnection {
 };
 
 /// Connects the point `p` to the camera. `u` and `v` in [0, 1) sample the point on the lens. If a
-/// latlong image shows a point several times, this function returns one position, and
-/// LightSplatFilter adds the other positions.
+/// latlong image shows a point several times, this function returns only one of the positions, and
+/// LightSplatFilter adds the others.
 template <typename F>
 inline CameraConnection<F> connect_to_camera(const CameraSetup& camera, const Vec3<F>& p,
                                              const F& u, const F& v, const F& time,
@@ -107,8 +108,8 @@ inline CameraConnection<F> connect_to_camera(const CameraSetup& camera, const Ve
     lens = aperture_point<F>(camera, u, v);
     focus = 1.f / camera.focus_distance;
   }
-  // d' and o. The window position is d' + lens / focus_distance or, for an orthographic camera, o
-  // minus the offset by the lens.
+  // d' and o. The window position is d' + lens / focus_distance. For an orthographic camera, it is
+  // o minus the offset by the lens.
   detail::LocalRay<F> ray;
   F wx, wy, spread = s;
   if (is_all_round) [[unlikely]] {

@@ -6,8 +6,8 @@
 namespace wavecomb {
 namespace {
 
-/// Returns CameraSetup::rolling. The start of a pixel's exposure moves from 0 to 1 - duration
-/// across the image, not counting the overscan.
+/// Returns CameraSetup::rolling. Across the image without overscan, the start of a pixel's exposure
+/// moves from 0 to 1 - duration.
 std::array<float, 3> rolling_of(const Camera& camera, float width, float height, float overscan) {
   const float all = 1.f - camera.rolling_duration;
   const float per_x = all / (width - 2 * overscan), per_y = all / (height - 2 * overscan);

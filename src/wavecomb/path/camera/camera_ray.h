@@ -15,8 +15,8 @@
 
 namespace wavecomb {
 
-/// Width of the ray cone of camera rays, in pixels. A pixel averages many samples, so that each
-/// sample may filter textures over less than a pixel. A cone of one pixel, as in Igehy's ray
+/// Width of the ray cone of camera rays, in pixels. A pixel averages many samples, so each sample
+/// can filter textures over less than a pixel. A cone of one pixel, as in Igehy's ray
 /// differentials, would blur textures more than renderers without ray cones do.
 inline constexpr float kConeShare = 0.25f;
 
@@ -71,8 +71,8 @@ inline MatrixLanes<F> camera_transform(const CameraSetup& camera, const F& time,
       .matrix();
 }
 
-/// Returns the depth of a point along the camera's axis at a shutter time or, for a latlong camera,
-/// its distance.
+/// Returns the depth of a point along the camera's axis at a shutter time. For a latlong camera,
+/// returns the distance of the point.
 template <typename F>
 inline F camera_depth(const CameraSetup& camera, const Vec3<F>& p, const F& time,
                       const Mask<F>& active) {
@@ -151,8 +151,8 @@ inline LocalRay<F> local_ray(const CameraSetup& camera, const F& x, const F& y, 
   return {o, d};
 }
 
-/// Reduces [near, far] to the part of the ray that no clipping plane cuts off. If nothing of the
-/// ray remains, `far` is set to `near`.
+/// Reduces [near, far] to the part of the ray that no clipping plane cuts off. If the clipping
+/// planes cut off the whole ray, `far` is set to `near`.
 template <typename F>
 inline void clip(const CameraSetup& camera, const LocalRay<F>& ray, F& near, F& far) {
   for (const auto& [a, b, c, d] : camera.clip_planes) {

@@ -2,10 +2,10 @@
 /// Lens distortion, and the shape of the aperture.
 ///
 /// Lens distortion is stored as a table over the image. For each image point, the table holds the
-/// position at which the ray through the point would cross an image without distortion. Brown's
-/// model (D. C. Brown, "Close-Range Camera Calibration", Photogrammetric Engineering 37(8), 1971,
-/// in OpenCV's notation) maps a point (x, y) of the plane at distance 1 to its image. With r^2 =
-/// x^2 + y^2 and y down,
+/// position where the point's ray would cross an image without distortion. Brown's model (D. C.
+/// Brown, "Close-Range Camera Calibration", Photogrammetric Engineering 37(8), 1971, in OpenCV's
+/// notation) maps a point (x, y) of the plane at distance 1 to its image. With r^2 = x^2 + y^2 and
+/// y down,
 ///   x' = x (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x y + p2 (r^2 + 2 x^2)
 ///   y' = y (1 + k1 r^2 + k2 r^4 + k3 r^6) + p1 (r^2 + 2 y^2) + 2 p2 x y
 /// and the table holds the inverse.

@@ -2,7 +2,7 @@
 /// Sampling of bounces from the lobes of the BSDF. With the setting `cosine_sampling`, a cosine
 /// distribution replaces all lobes except delta lobes.
 ///
-/// A delta lobe keeps its selection probability q, so the density of a cosine bounce is
+/// Delta lobes keep their selection probability q, so the density of a cosine bounce is
 ///   p(wi) = (1 - q) |cos theta_i| / pi
 /// on the side of wo. Only programs without transmission use cosine sampling.
 #pragma once

@@ -42,8 +42,8 @@ template <typename F>
 
 /// Returns the emission of a surface. In `lanes`, textures and graphs are evaluated at the finest
 /// texture level, as in light sampling and emission sampling. In all other lanes, the result is
-/// `filtered`. Filtered emission has a different mean wherever emission is cut off, by an edge of
-/// the mesh or by the weights of multiple importance sampling.
+/// `filtered`. Filtered emission has a different mean wherever emission is cut off by an edge of
+/// the mesh, or reduced by MIS weights.
 template <typename F>
 [[gnu::noinline, gnu::cold]] Color<F> finest_emission(const SceneView& scene, const MeshHit<F>& hit,
                                                       const Surface<F>& s, const Vec3<F>& dir,

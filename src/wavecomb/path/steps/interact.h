@@ -46,7 +46,7 @@ struct MaterialLookup {
 };
 
 /// Shading point on a surface. Later steps use only `bsdf`, `throughput` and the member functions,
-/// so that volume events can provide the same interface. Only surfaces have the step `emit`.
+/// so that volume events can provide the same interface. The step `emit` runs only for surfaces.
 template <typename Bsdf, typename F>
 struct SurfaceInteraction : SurfaceHitPoint<Bsdf, F>, MaterialLookup<Bsdf, F> {
   using SurfaceHitPoint<Bsdf, F>::s;
@@ -66,7 +66,7 @@ struct SurfaceInteraction : SurfaceHitPoint<Bsdf, F>, MaterialLookup<Bsdf, F> {
   template <uint32_t kFeatures>
   Mask<F> is_adjusted(const Vertex<F, kFeatures>& v, const Frame<F>& unadjusted,
                       const Vec3<F>& dir) const;
-  /// Records albedo, normal and texture coordinates for AOVs that need them.
+  /// Records albedo, normal and texture coordinates for the AOVs of the render.
   template <uint32_t kFeatures>
   void record_aovs(const Vertex<F, kFeatures>& v, const Frame<F>& frame) const;
   /// Returns the link class of the surface.
@@ -76,8 +76,8 @@ struct SurfaceInteraction : SurfaceHitPoint<Bsdf, F>, MaterialLookup<Bsdf, F> {
   Vec3<F> origin(const Vec3<F>& dir) const;
   /// Returns the origin of a ray that leaves along `dir`, without the terminator offset.
   Vec3<F> clear_origin(const Vec3<F>& dir) const;
-  /// Returns whether a direction is on the same side of the geometric normal as of the shading
-  /// normal. Directions on the other side would leak light.
+  /// Returns whether a direction is on the same side of the surface by the geometric normal and by
+  /// the shading normal. Other directions would leak light.
   Mask<F> is_consistent(const Vec3<F>& world, const Vec3<F>& local) const;
 
  private:
@@ -89,10 +89,10 @@ struct SurfaceInteraction : SurfaceHitPoint<Bsdf, F>, MaterialLookup<Bsdf, F> {
   Vec3<F> tangent() const { return select<F>(this->reads_texture, s.dpdu, Vec3<F>(F(0.f))); }
 };
 
-/// Returns the footprint of a texture lookup `width` wide. Lookups at the first hit filter the
-/// whole footprint, since single texels would be visible as noise. Lookups after a bounce read a
-/// single random texel, since the path is noisier than the texture. The setting
-/// `filters_all_lookups` filters all lookups.
+/// Returns the footprint of a texture lookup of the given width. Lookups at the first hit filter
+/// the whole footprint, since single texels would be visible as noise. Lookups after a bounce read
+/// a single random texel, since the path itself adds more noise than a single texel does. The
+/// setting `filters_all_lookups` filters all lookups.
 template <typename F, uint32_t kFeatures>
 WAVECOMB_INLINE Footprint<F> footprint_of(const Vertex<F, kFeatures>& v, const F& width) {
   using U = UInt<F>;
@@ -110,8 +110,8 @@ WAVECOMB_INLINE UInt<F> textured_inputs_of(const Vertex<F, kFeatures>& v) {
                           v.active);
 }
 
-/// Looks up the material and constructs the BSDF in one function, so that kernels keep no
-/// parameters that they do not read.
+/// Looks up the material and constructs the BSDF in one function, so that kernels do not store
+/// parameters that they never read.
 template <typename Bsdf, typename F, uint32_t kFeatures>
 WAVECOMB_INLINE MaterialLookup<Bsdf, F> look_up_material(const Vertex<F, kFeatures>& v,
                                                          const Surface<F>& s, bool textured) {
@@ -191,8 +191,8 @@ WAVECOMB_INLINE Vec3<F> SurfaceInteraction<Bsdf, F>::bumped(const Vec3<F>& n,
   return normalize(make_frame<F>(n, tangent, s.handedness).to_world(this->normal));
 }
 
-/// Aligns the frame to the texture in lanes that read one. The frame of a lane depends only on the
-/// lane's hit, not on other lanes.
+/// In lanes that read a texture, aligns the frame to the texture. The frame of a lane depends only
+/// on the lane's hit, not on other lanes.
 template <typename Bsdf, typename F>
 template <uint32_t kFeatures>
 WAVECOMB_INLINE Frame<F> SurfaceInteraction<Bsdf, F>::frame(const Vertex<F, kFeatures>& v) const {

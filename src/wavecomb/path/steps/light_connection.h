@@ -6,15 +6,16 @@
 /// Bounces therefore estimate two integrals over solid angle, one about each origin,
 ///   sum over s of  int_{s} f(wo, wi) |cos theta_i| L(o_s, wi) dwi.
 /// Emission that a bounce hits is weighted with the density of a light sample as seen from o_s
-/// (PathState::o). Light sampling estimates the same two integrals: a sample belongs to the side s
-/// on which it lies as seen from o_s. Its direction, distance, density and shadow ray start at o_s,
-/// so that the densities of both techniques have the same measure and their weights add up to 1.
+/// (PathState::o). Light sampling estimates the same two integrals: a light sample belongs to side
+/// s if it lies on this side as seen from o_s. Its direction, distance, density and shadow ray
+/// start at o_s, so that the densities of both techniques have the same measure and their weights
+/// add up to 1.
 ///
 /// If p has no terminator offset, the two origins differ only by rounding. A single light sample,
-/// taken from the viewer's side, is then used for both sides, and only the length of its shadow ray
-/// depends on the side. If p has a terminator offset, the same random numbers are used from both
-/// origins. If each of the two samples lies on the side of its origin, one sample is chosen with
-/// probability 1/2 and its contribution is doubled.
+/// taken from the viewer's side, is then used for both sides, and only the origin and the length of
+/// its shadow ray depend on the side. If p has a terminator offset, a light is sampled from both
+/// origins with the same random numbers. If both samples lie on the sides of their origins, one of
+/// them is chosen with probability 1/2 and its contribution is doubled.
 #pragma once
 
 #include "wavecomb/core/sampler.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Classification of scatterings for light path expressions. These functions run only if the render
-/// has light path expressions.
+/// Classification of scattering events for light path expressions. These functions run only if the
+/// render has light path expressions.
 ///
 /// A BSDF is a sum of lobes, and a direction does not say which lobe scattered the light. A
 /// scattering event is therefore split for each colour channel: the fraction f_diffuse / f counts

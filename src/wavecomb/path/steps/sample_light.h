@@ -19,8 +19,8 @@
 
 namespace wavecomb {
 
-/// Returns the receiver for light sampling. The position of the receiver is not set yet; it is set
-/// when a light is sampled.
+/// Returns the receiver for light sampling, without its position, which is set when a light is
+/// sampled.
 template <typename Bsdf, typename F, uint32_t kFeatures>
 WAVECOMB_INLINE LightReceiver<F> light_receiver(const Vertex<F, kFeatures>& v,
                                                 const Frame<F>& frame, const Vec3<F>& wo) {
@@ -90,7 +90,7 @@ WAVECOMB_INLINE LightCandidate<F> light_candidate(
     set = shadow_set<F>(lights, light, active_lights);
   }
   Mask<F> valid = active_lights & l.valid & at.is_consistent(l.wi, wi);
-  // Light that enters a subsurface body is sampled by the random walk instead
+  // Light that enters a subsurface body is not sampled here but by the random walk
   // (medium/subsurface/random_walk.h).
   if constexpr ((kFeatures & kSubsurface) != 0 && Bsdf::kHasSubsurface)
     valid = valid & not_(at.bsdf.enters(c.wo, wi));
@@ -105,13 +105,13 @@ inline constexpr uint32_t kFibreCandidates = 3;
 /// its unoccluded contribution c_i:
 ///   c = c_k sum_i g_i / (n g_k),   k with probability g_k / sum_i g_i
 /// (resampled importance sampling: J. Talbot, D. Cline, P. Egbert, "Importance Resampling for
-/// Global Illumination", 2005). The expected value equals that of a single light sample, for any
-/// densities and MIS weights in c. The MIS weights of a single light sample therefore stay valid.
-/// On hair, where shadow rays are expensive, selecting an important light justifies the evaluation
-/// of several light samples (docs/decisions/light-candidates.md). `first` is the candidate for the
-/// sample values `r`. The other candidates use shifted sample values: evenly over all lights, and
-/// on each light by the R2 lattice (M. Roberts, "The Unreasonable Effectiveness of Quasirandom
-/// Sequences", 2018).
+/// Global Illumination", 2005). The expected value is the same as with a single light sample, for
+/// any densities and MIS weights in c. The MIS weights of a single light sample therefore stay
+/// valid. On hair, where shadow rays are expensive, selecting an important light justifies the
+/// evaluation of several light samples (docs/decisions/light-candidates.md). `first` is the
+/// candidate for the sample values `r`. The other candidates use shifted sample values: evenly over
+/// all lights, and on each light by the R2 lattice (M. Roberts, "The Unreasonable Effectiveness of
+/// Quasirandom Sequences", 2018).
 template <typename F, typename Candidate>
 WAVECOMB_INLINE LightCandidate<F> resample(const LightCandidate<F>& first, const Sample4<F>& r, F u,
                                            const Candidate& candidate) {
@@ -132,8 +132,8 @@ WAVECOMB_INLINE LightCandidate<F> resample(const LightCandidate<F>& first, const
         Sample4<F>{moved(r.x, n / kN), moved(r.y, n * kSteps[0]), moved(r.z, n * kSteps[1]), r.w});
     const F h = brightness(other);
     sum += h;
-    // The same random number is used for all selections. Rescaling after each selection makes it
-    // uniform again.
+    // The same random number is used for all selections. Rescaling after each selection makes this
+    // number uniform again.
     const F q = select(h > 0.f, F(h / select(h > 0.f, sum, F(1.f))), F(0.f));
     const Mask<F> replaces = u < q;
     u = select(replaces, F(u / max(q, F(1e-20f))), F((u - q) / max(F(1.f - q), F(1e-20f))));

@@ -14,8 +14,8 @@
 namespace wavecomb {
 
 /// Roulette terminates only paths whose throughput is below 1 / kRouletteGain. A gain of 1 saves
-/// rays but adds more noise than the savings justify: on the Cornell box, a gain of 3 has the least
-/// product of relMSE and ray count (docs/decisions/roulette.md).
+/// rays but adds too much noise: on the Cornell box, a gain of 3 has the least product of relMSE
+/// and ray count (docs/decisions/roulette.md).
 inline constexpr float kRouletteGain = 3.f;
 
 /// Returns the probability of shading a vertex that a path has reached, by cost-aware roulette.
@@ -65,8 +65,8 @@ WAVECOMB_INLINE void record_bounce(const Vertex<F, kFeatures>& v, const GuidingL
 /// Applies roulette after a vertex, with the random number `u` in [0, 1). The survival probability
 /// depends on the throughput or, where a trained estimate of the bounce's expected contribution
 /// exists, on this estimate (guiding/roulette.h). The throughput after a guided bounce does not
-/// predict its contribution, since it is smallest in the directions that most light comes from.
-/// `arrived` is the luminance of the throughput at the vertex.
+/// predict the bounce's contribution, since the throughput is smallest in the directions that most
+/// light comes from. `arrived` is the luminance of the throughput at the vertex.
 template <typename F, uint32_t kFeatures>
 WAVECOMB_INLINE void survive(const Vertex<F, kFeatures>& v, const GuidingLookup<F>& guiding,
                              const F& arrived, const F& u, VertexResult<F>& out) {

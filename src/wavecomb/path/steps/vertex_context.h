@@ -12,8 +12,9 @@ namespace wavecomb {
 /// Context of all steps after `interact`. The members refer to values of the vertex that
 /// vertex_steps() (path/vertex.h) computes once.
 ///
-/// Contract: valid only within vertex_steps(). Steps read the context, and write VertexResult and
-/// the outputs of Vertex. Since the steps are inlined, the references do not cost memory accesses.
+/// Contract: the context is valid only within vertex_steps(). Steps read the context, and write
+/// VertexResult and the outputs of Vertex. Since the steps are inlined, the references cause no
+/// memory accesses.
 template <typename Bsdf, typename F, uint32_t kFeatureSet, typename Coupling>
 struct VertexContext {
   using Program = Bsdf;

@@ -25,8 +25,8 @@ void look_up_field(const GuidingTraining& training, const LearnedQuery& point, L
     out.density[i] = guiding_pdf<float>(view, found, bin_direction(i), true);
 }
 
-/// Estimates the selection probabilities of lights at `point`, by counting the lights that evenly
-/// spaced sample values select.
+/// Estimates the selection probabilities of lights at `point`: selects lights with evenly spaced
+/// sample values, and counts how often each light is selected.
 void count_lights(const Learned& learned, const LearnedQuery& point, LearnedData& out) {
   const Scene& scene = *learned.scene;
   const LightParts parts = divide_lights(scene, false);  // used for the names of lights

@@ -18,16 +18,16 @@
 
 namespace wavecomb {
 
-/// Results of the pilot renders of a render, which do not change during its passes.
+/// Results of the pilot renders of a render. The results do not change during the passes of the
+/// render.
 struct Learned {
   std::shared_ptr<const Scene> scene;              ///< the rendered scene
   bool by_tree = false;                            ///< LightView::by_tree
   std::shared_ptr<const LightCalibration> lights;  ///< null if lights are selected by power
   std::shared_ptr<const GuidingTraining>
-      training;  ///< result of guiding training, which may have no guiding field
-  std::optional<TransportChoice>
-      /// Transport that a pilot render chose; empty if the settings specify the transport.
-      transport;
+      training;  ///< result of guiding training, with or without a guiding field
+  /// Transport that a pilot render chose; empty if the settings specify the transport.
+  std::optional<TransportChoice> transport;
 };
 
 /// Surface point at which learned data is looked up.
@@ -38,8 +38,8 @@ struct LearnedQuery {
 
 /// Learned data at a surface point.
 struct LearnedData {
-  /// `axis` is the axis that the surface faces (one of kGuidingAxes). `known` says whether the
-  /// guiding field has a region at the point.
+  /// `axis` is the one of kGuidingAxes that the surface faces. `known` says whether the guiding
+  /// field has a region at the point.
   uint32_t axis = 0;
   bool known = false;
   /// Density per steradian of the guiding distribution, empty unless `known` is set. The values are

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Recording of the rays of a render, for tracing the rays again. The rays can be traced by Embree
-/// alone, which measures the greatest possible speed, or by the accelerator as in a render.
+/// Recording of the rays of a render, so that the same rays can be traced again. The rays can be
+/// traced by Embree alone, to measure the greatest possible speed, or by the accelerator as in a
+/// render.
 #pragma once
 
 #include <array>
@@ -23,8 +24,8 @@ inline constexpr size_t kRayKinds = 3;
 struct Replay {
   bool alone = true;     ///< trace the rays by Embree alone instead of by EmbreeAccelerator
   uint32_t threads = 0;  ///< 0 means all hardware threads
-  /// Rays per packet and Embree's coherence flag, for each kind of ray. A kind of ray without a
-  /// flag uses the flag of the recorded rays.
+  /// Rays per packet and Embree's coherence flag, for each kind of ray. If no flag is given for a
+  /// kind of ray, the flag of the recorded rays is used.
   std::array<uint32_t, kRayKinds> width{16, 16, 16};
   std::array<std::optional<bool>, kRayKinds> coherent{};
   std::array<bool, kRayKinds> wanted{true, true, true};  ///< kinds to trace

@@ -7,8 +7,8 @@
 namespace wavecomb {
 namespace {
 
-/// Marks all values within kDilation of a marked value, along each line. A line has `length`
-/// values, with a stride of `step`.
+/// Along each line, marks all values whose distance to a marked value is at most kDilation. A line
+/// has `length` values, with a stride of `step`.
 void dilate_along(std::vector<uint8_t>& marks, size_t lines, size_t line_step, size_t length,
                   size_t step) {
   std::vector<uint8_t> line(length);

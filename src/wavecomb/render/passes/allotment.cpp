@@ -32,8 +32,8 @@ double light_of(const Film& film, size_t pixel) {
   return std::isfinite(light) ? std::max(0.0, light) : 0.0;
 }
 
-/// Returns the typical brightness of the image: the square of the mean square root of all pixels,
-/// which a few bright pixels hardly change.
+/// Returns the typical brightness of the image: the square of the mean of all pixels' square roots.
+/// A few bright pixels hardly change this value.
 double typical_brightness(const Film& film) {
   double root = 0;
   for (size_t i = 0; i < film.pixel_count(); ++i) root += std::sqrt(light_of(film, i));
@@ -116,8 +116,8 @@ std::vector<double> fill_up(const std::vector<double>& weights, double pilot, do
   return more;
 }
 
-/// Rounds `parts` to integers that add up to `total`, up or down by a hash of the pixel index, so
-/// that the expected value of each is unchanged.
+/// Rounds `parts` to integers that add up to `total`. A hash of the pixel index decides whether a
+/// part is rounded up or down, so that its expected value is unchanged.
 std::vector<uint32_t> round_parts(const std::vector<double>& parts, uint64_t total, uint32_t seed) {
   const size_t count = parts.size();
   std::vector<uint32_t> out(count);
@@ -127,7 +127,7 @@ std::vector<uint32_t> round_parts(const std::vector<double>& parts, uint64_t tot
         std::ldexp(static_cast<double>(hash_u32<uint32_t>(static_cast<uint32_t>(i), seed)), -32);
     given += out[i] = static_cast<uint32_t>(std::floor(parts[i] + u));
   }
-  // The sum of the rounded parts may differ slightly from `total`: change pixels at even distances
+  // If the sum of the rounded parts differs from `total`, change the counts of evenly spaced pixels
   // by one.
   while (given != total) {
     const uint64_t wrong = std::min<uint64_t>(given < total ? total - given : given - total, count);
@@ -189,7 +189,7 @@ SampleAllocation allocate_samples(Film& film, const Settings& settings,
   SampleAllocation out{pilot_samples(settings), settings.spp, {}};
   const uint32_t more = out.spp - out.pilot;
   // Sample counts are multiples of a quantum. The samples of a pixel then form nets of the Sobol
-  // sequence. There are also few different counts, which keeps waves full.
+  // sequence, and few different counts occur, which keeps waves full.
   const uint32_t quantum = std::max(1u, std::bit_floor(settings.spp) / 8);
   const uint32_t quanta = more / quantum;
   const size_t count = film.pixel_count();

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Number of samples of each pixel, from a pilot render of all pixels.
 ///
-/// A pixel with standard deviation s, mean I and cost c per sample that gets n of all N samples
+/// If a pixel with standard deviation s, mean I and cost c per sample gets n of all N samples, it
 /// adds (s / I)^2 / n to the relative error of the image and n c to its render time. For a given N,
-/// the error is least if n is proportional to s / I (Neyman, JRSS 97(4), 1934); error times time is
-/// least if n is proportional to (s / I) / sqrt(c).
+/// the error is least if n is proportional to s / I (Neyman, JRSS 97(4), 1934); the product of
+/// error and render time is least if n is proportional to (s / I) / sqrt(c).
 ///
 /// I includes light splats, although more samples of a pixel do not reduce the noise of its light
 /// splats.
 ///
-/// The sample count of a pixel must not depend on the pixel's own samples, because its mean would
-/// then be biased. Therefore s / I and c are means over the surrounding pixels, without the pixel
-/// itself. A pixel then influences its sample count only through the common scale of all weights,
-/// because the pixel affects the weights of its 24 neighbours.
+/// The sample count of a pixel must not depend on the samples of the pixel, because the mean of the
+/// pixel would then be biased. Therefore s / I and c are means over the surrounding pixels, without
+/// the pixel itself. A pixel then influences its sample count only through the common scale of all
+/// weights, since it affects the weights of its 24 neighbours.
 #pragma once
 
 #include <span>
@@ -25,12 +25,13 @@ namespace wavecomb {
 
 /// Half width in pixels of the window over which s / I and c are averaged.
 inline constexpr uint32_t kAllocationWindow = 2;
-/// Limits of the weight of a pixel, relative to the mean weight. A pixel that was dark by chance
-/// therefore does not get too few samples, and a firefly does not get most of the samples.
+/// Limits of the weight of a pixel, relative to the mean weight. The limits ensure that a pixel
+/// that was dark by chance does not get too few samples, and that a firefly does not get most of
+/// the samples.
 inline constexpr double kMinWeight = 0.125, kMaxWeight = 8;
 
 /// Returns the samples per pixel of the pilot render. If the result is 0, all pixels get the same
-/// number of samples, either by the settings or because the render has too few samples.
+/// number of samples, because the settings ask for this or because the render has too few samples.
 uint32_t pilot_samples(const Settings& settings);
 
 /// Statistics of an allotment.

@@ -21,7 +21,8 @@
 
 namespace wavecomb {
 
-/// Renders passes until the settings' goal is reached: samples, error or time.
+/// Renders passes until the goal of the settings is reached, which is a number of samples, an error
+/// or a time.
 ///
 /// Contract: one thread calls run(), within the arena of the PassRunner. Any thread may call
 /// status(). Without a time limit, the rendered samples depend only on film, settings and pass.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Planning of a pass: which pixels it renders, from which sample on, and how many samples. Plans
-/// are pure functions of the film's sample counts, the settings and, if there is a time limit, the
-/// time left.
+/// Planning of a pass: its pixels, and the first sample and the number of samples of each pixel.
+/// Plans are pure functions of the film's sample counts, the settings and, if there is a time
+/// limit, the time left.
 #pragma once
 
 #include <cstdint>
@@ -13,8 +13,8 @@
 
 namespace wavecomb {
 
-/// Adaptive renders check errors at sample counts that are multiples of this number. The number
-/// covers two blocks of each half buffer (ErrorSums), and is a net of the Sobol sequence.
+/// Adaptive renders check errors at sample counts that are multiples of this number. This many
+/// samples fill two blocks of each half buffer (ErrorSums), and form a net of the Sobol sequence.
 inline constexpr uint32_t kCheckSamples = 16;
 
 /// Target sample counts of pixels, which may differ between pixels (render/passes/allotment.h).
@@ -25,7 +25,7 @@ struct SampleAllocation {
   /// Sample count of each pixel at the end; empty until the pilot render is done.
   std::vector<uint32_t> counts;
 
-  /// Returns the sample count of a pixel at the time when the mean sample count is `target`.
+  /// Returns the sample count of a pixel when the mean sample count is `target`.
   uint32_t at(size_t pixel, uint32_t target) const {
     if (counts.empty() || target <= pilot) return target;
     const uint64_t more = counts[pixel] - pilot;
@@ -38,7 +38,7 @@ struct PassState {
   /// Sample count of each active pixel after the pass, or the mean if the counts differ.
   uint32_t target = 0;
   uint32_t light_target = 0;  ///< number of samples of light paths after the pass
-  /// For each pixel, row by row: 1 if active; empty if all pixels are active.
+  /// 1 for each active pixel, else 0, row by row; empty if all pixels are active.
   std::vector<uint8_t> active{};
   SampleAllocation allocation{};
 
@@ -48,22 +48,23 @@ struct PassState {
 /// Settings that determine passes.
 struct PassRules {
   uint32_t spp = 1;      ///< maximum number of samples per pixel
-  uint32_t min_spp = 0;  ///< in adaptive renders: samples before the first error check
+  uint32_t min_spp = 0;  ///< number of samples before the first error check of an adaptive render
   bool adaptive = false;
-  bool timed = false;        ///< whether the render has a time limit
-  uint32_t step = 16;        ///< samples that a pass adds if the render is not adaptive
-  bool progressive = false;  ///< whether sample counts double from one sample on
+  bool timed = false;  ///< whether the render has a time limit
+  uint32_t step = 16;  ///< samples that a pass adds if the render is not adaptive
+  /// Whether sample counts double from pass to pass, starting with one sample.
+  bool progressive = false;
   /// Sample count at which the pilot render ends; 0 if all pixels get the same number.
   uint32_t pilot = 0;
 };
 
-/// Time until the time limit, and rendering speed so far.
+/// Time left until the time limit, and rendering speed so far.
 struct TimeLeft {
   double seconds = std::numeric_limits<double>::infinity();
   double samples_per_s = 0;
 };
 
-/// Returns whether an adaptive render checks errors when its pixels have `n` samples. The first
+/// Returns whether an adaptive render checks errors when the pixels have `n` samples. The first
 /// check is at min_spp, rounded up to a multiple of kCheckSamples, and the last at spp. Near n
 /// samples, the distance between two checks is a quarter of the largest power of two below n, but
 /// at least kCheckSamples. A pixel therefore gets at most a quarter more samples than it needs, and

@@ -14,8 +14,8 @@ namespace wavecomb {
 
 std::vector<WaveGroup> wave_groups(const PassPlan& plan, uint32_t wave_size, uint32_t threads) {
   std::vector<WaveGroup> groups;
-  // Near the end of a render, only few pixels may remain that need many samples. Distribute these
-  // pixels over all workers.
+  // Near the end of a render, a few pixels may remain that still need many samples. Distribute
+  // these pixels over all workers.
   const size_t most = (plan.pixels.size() + size_t{threads} * 4 - 1) / (size_t{threads} * 4);
   for (const PassBatch& batch : plan.batches) {
     const size_t fill = std::max(1u, wave_size / std::min(batch.samples, wave_size));

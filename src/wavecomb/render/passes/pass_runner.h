@@ -22,8 +22,7 @@ struct WaveGroup {
   uint32_t wave_samples;  ///< maximum number of samples of a pixel in one wave
 };
 
-/// Splits a plan into groups of waves. Waves are full, except where full waves would leave workers
-/// idle.
+/// Splits a plan into groups of waves. Waves are full unless full waves would leave workers idle.
 std::vector<WaveGroup> wave_groups(const PassPlan& plan, uint32_t wave_size, uint32_t threads);
 
 /// Runs plans on an integrator.
@@ -34,8 +33,8 @@ class PassRunner {
   PassRunner(Integrator& integrator, uint32_t threads, uint32_t wave_size);
 
   /// Runs a plan until it is done or `halted` returns true. All workers call `halted` before each
-  /// wave. After run(), the samples of every pixel form complete waves, without gaps. `joint` means
-  /// that the plan consists of light paths (WaveTask::joint), which do not count as samples.
+  /// wave. After run(), each pixel has all samples of complete waves, without gaps. If `joint` is
+  /// true, the plan consists of light paths (WaveTask::joint), which do not count as samples.
   void run(const PassPlan& plan, const std::function<bool()>& halted, bool joint = false);
 
   const Integrator& integrator() const { return integrator_; }
@@ -55,7 +54,8 @@ class PassRunner {
 
   Integrator& integrator_;
   uint32_t wave_size_;
-  std::vector<char> workers_;  ///< one element per worker, whose address identifies it
+  /// One element per worker; the element's address identifies the worker.
+  std::vector<char> workers_;
   std::atomic<uint64_t> samples_{0}, rays_{0};
   Clock::time_point start_ = Clock::now();
   double first_samples_s_ = 0;

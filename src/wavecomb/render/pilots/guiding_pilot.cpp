@@ -14,14 +14,14 @@ namespace wavecomb {
 namespace {
 
 constexpr std::array<uint32_t, 2> kPilotSeeds = {0x6c078965u, 0x9908b0dfu};
-/// Fraction of pixels with the largest differences that are left out. A pilot render has a few
-/// hundred pixels, of which a few noisy ones would otherwise determine the result.
+/// This fraction of the pixels is left out, namely the pixels with the largest differences. A pilot
+/// render has a few hundred pixels, of which a few noisy ones would otherwise determine the result.
 constexpr double kUncounted = 0.02;
-/// Paths whose vertices are held at once: about 30 MB.
+/// Number of paths whose vertices are stored at the same time, which takes about 30 MB.
 constexpr size_t kPathsAtOnce = 65'536;
 
 /// Stores the luminance of each path of a pilot render. The paths store no vertices, so that they
-/// run in the same kernels as the paths of the image.
+/// use the same kernels as the paths of the image.
 ///
 /// Contract: workers may call ended() concurrently for different paths.
 class LuminanceReader final : public HistoryReader {
@@ -51,7 +51,8 @@ class LuminanceReader final : public HistoryReader {
   std::vector<float> luminances_;
 };
 
-/// Returns the cost of the work that an integrator has done, in rays traced through a BVH.
+/// Returns the cost of the work that an integrator has done, in units of one ray traced through a
+/// BVH.
 double cost_of(const Integrator& integrator, const WaveSetup& waves, bool has_list,
                bool uses_field) {
   double rays = 0, records = 0;
@@ -85,7 +86,7 @@ double trace_training_paths(WaveContext context, const WaveSetup& waves,
                             std::span<const uint32_t> pixels, const TrainingPlan& plan,
                             TrainingSamples& training_samples,
                             const std::function<bool()>& stopped) {
-  // An integrator records vertices only if there is a reader when it is made.
+  // An integrator records vertices only if there is a HistoryReader when the integrator is created.
   BounceReader no_reader({}, plan);
   context.histories = &no_reader;
   const std::unique_ptr<Integrator> integrator = make_integrator(

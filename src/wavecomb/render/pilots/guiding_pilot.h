@@ -15,27 +15,27 @@ namespace wavecomb {
 
 /// Cost of a ray tested against a list of triangles, relative to a ray traced through a BVH.
 inline constexpr double kListRay = 0.3;
-/// Costs in rays of shading a vertex and of looking up the guiding field there. Used by pilot
-/// renders; learned roulette uses the costs of the materials.
+/// Costs in rays of shading a vertex and of looking up the guiding field there. Pilot renders use
+/// these costs, while learned roulette uses the costs of the materials.
 inline constexpr double kShadingRays = 0.7, kGuidedRays = 0.9;
 
-/// Returns `count` pixels of `order`, evenly spread, in the same order.
+/// Returns `count` evenly spaced pixels of `order`, in the same order.
 std::vector<uint32_t> subset_of_pixels(const std::vector<uint32_t>& order, uint64_t count);
 
-/// Returns the mean without the given fraction of the largest values. Sorts `values`.
+/// Returns the mean of `values` without the largest values, a fraction `share` of all values. Sorts
+/// `values`.
 double trimmed_mean(std::vector<double>& values, double share);
 
 /// Traces the paths of `plan` from `pixels`, guided by the field of `context`, in batches that
-/// bound memory. Replaces the bounces and paths in `training_samples` and appends to its records.
-/// Returns the cost, in rays traced through a BVH.
+/// limit memory use. Replaces the bounces and paths in `training_samples`, but appends to the
+/// records. Returns the cost, in rays traced through a BVH.
 double trace_training_paths(WaveContext context, const WaveSetup& waves,
                             std::span<const uint32_t> pixels, const TrainingPlan& plan,
                             TrainingSamples& training_samples,
                             const std::function<bool()>& stopped);
 
 /// Result of a pilot render: two images of some pixels with different seeds. Both images use the
-/// sampler of the render, so that their noise is as low as that of the render's well-distributed
-/// samples.
+/// sampler of the render, so that they also benefit from its well-distributed samples.
 struct PilotRender {
   uint32_t samples = 0;             ///< samples per pixel, in each image
   std::vector<double> differences;  ///< difference of the two means of each pixel

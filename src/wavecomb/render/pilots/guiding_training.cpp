@@ -22,23 +22,23 @@ namespace {
 /// kMinTrainingPaths and kMaxTrainingPaths.
 constexpr uint64_t kTrainingShare = 8, kMaxTrainingPaths = 700'000, kMinTrainingPaths = 16'384;
 /// For Guiding::kAuto: minimum number of samples of a render for which a pilot render is
-/// worthwhile, and the number of samples for each training path of the first two rounds. The second
-/// round takes place only if the field of the first one reduces noise.
+/// worthwhile. The first two rounds trace one training path for every kAutoShares[round] samples of
+/// the render. The second round takes place only if the field of the first round reduces noise.
 constexpr uint64_t kMinAutoSamples = 2'000'000;
 constexpr std::array<uint64_t, 2> kAutoShares = {200, 40};
 constexpr uint64_t kMaxFirstPaths = 30'000, kMaxSecondPaths = 150'000;
 /// Camera samples and training paths per thread and second, assumed before the first round is
-/// timed, and the divisor of a time limit that gives the time for training.
+/// timed. Training may take the time limit divided by kTimeShare.
 constexpr double kSamplesPerSecond = 250'000, kTrainingPathsPerSecond = 50'000, kTimeShare = 8;
-/// For Guiding::kAuto: divisors of the time limit after which training gives up, at first and once
-/// guiding is known to reduce noise.
+/// For Guiding::kAuto, training gives up after the time limit divided by kMaxTimeShare, or by
+/// kMaxGuidedTimeShare once guiding is known to reduce noise.
 constexpr double kMaxTimeShare = 20, kMaxGuidedTimeShare = 4;
-/// Cost of recording and sorting the vertices of a training path, as a factor on its rays and
-/// shading.
+/// Cost of a training path with the recording and sorting of its vertices, relative to the cost of
+/// its rays and shading.
 constexpr double kRecordingCost = 1.5;
-/// Each image of a pilot render takes one of every kPilotShare samples of the render, within these
-/// limits, and has a limited number of samples per pixel. A pilot render has fewer pixels rather
-/// than fewer samples per pixel: noise of Sobol samples falls faster with their number for smooth
+/// Each image of a pilot render has one sample for every kPilotShare samples of the render, within
+/// the limits below. The number of samples per pixel is also limited. A pilot render has fewer
+/// pixels rather than fewer samples per pixel: the noise of Sobol samples falls faster for smooth
 /// integrands, and guiding makes the integrand less smooth, so gains at low sample counts would be
 /// misleading.
 constexpr uint64_t kPilotShare = 320, kMinPilotPaths = 2048, kMaxPilotPaths = 65'536;
@@ -47,17 +47,17 @@ constexpr uint32_t kMinPilotSamples = 16, kMaxPilotSamples = 32;
 /// gain there is below kHopelessGain, the other pixels are not rendered.
 constexpr size_t kFirstPixels = 4;
 constexpr double kHopelessGain = 0.8;
-/// Samples per pixel from which the variance is estimated for learned roulette.
+/// Number of samples per pixel that estimate the variance for learned roulette.
 constexpr uint32_t kSpreadSamples = 16;
-/// Learned roulette takes one variance sample for every kSpreadShare training paths.
+/// For learned roulette, one path for every kSpreadShare training paths estimates the variance.
 constexpr uint64_t kSpreadShare = 8;
-/// Fraction of paths with the largest differences that are left out of the variance.
+/// Fraction of the paths that is left out of the variance: the paths with the largest differences.
 constexpr double kTrimmedPaths = 0.001;
 /// Least measured gains in efficiency for which training continues after the first and the second
 /// round. The render is guided if the gain after the second round reaches the second value.
 constexpr std::array<double, 2> kMinGains = {1.1, 1.25};
-/// Gain from which the third round takes the share of a render with Guiding::kOn; with a lower gain
-/// it takes half of that share.
+/// Gain at which the third round uses the full training budget of Guiding::kOn. With a lower gain,
+/// it uses half of this budget.
 constexpr double kFullTrainingGain = 1.5;
 constexpr uint32_t kTrainingRounds = 3;
 
@@ -80,9 +80,9 @@ uint64_t training_paths(const Settings& settings, uint32_t threads) {
 }
 
 /// Returns the mean cost and variance of a path, with the effect of roulette, from the paths of the
-/// last round, which were traced from `pixels`. `spread` is the variance without roulette. An
-/// unknown variance is estimated from differences between neighbours, without the paths that differ
-/// most.
+/// last round, which were traced from `pixels`. `spread` is the variance without roulette. If
+/// `spread` is empty, the variance is estimated from differences between neighbours, without the
+/// paths that differ most.
 PathStatistics mean_path(const TrainingSamples& training_samples, std::span<const uint32_t> pixels,
                          const ImageTiles& tiles, std::optional<double> spread) {
   PathStatistics mean;
@@ -128,8 +128,8 @@ class Trainer {
         pilot_pixels_(pixels_of_pilot()),
         field_(std::make_shared<const GuidingField>(grid_)) {
     settings_.seed = 0x2545f491u;
-    // Disable roulette: it multiplies the contribution of survivors, and the added noise would hide
-    // the gain of guiding.
+    // Disable roulette, which multiplies the contribution of surviving paths. The added noise would
+    // hide the gain of guiding.
     settings_.roulette = RouletteKind::kOff;
     if (is_auto() && is_timed()) max_s_ = double{settings_.time_limit} / kMaxTimeShare;
     context_.settings = &settings_;
@@ -173,7 +173,8 @@ class Trainer {
       if (round == 0) measure_speed(cost, without);
       if (!pays(round, without)) return result(false);
     }
-    // The render will be guided, so more training is worthwhile: it improves the guiding field.
+    // The render will be guided, so more training is worthwhile because it improves the guiding
+    // field.
     if (is_timed()) max_s_ = double{settings_.time_limit} / kMaxGuidedTimeShare;
     budget_ = max_paths();
     if (statistics_.gain < kFullTrainingGain) budget_ /= 2;
@@ -196,7 +197,7 @@ class Trainer {
     return out;
   }
 
-  /// Returns the pixels of the pilot renders, those of the first part in front.
+  /// Returns the pixels of the pilot renders, starting with those of the first part.
   std::vector<uint32_t> pixels_of_pilot() const {
     const uint64_t paths = std::clamp(samples_ / kPilotShare, kMinPilotPaths, kMaxPilotPaths);
     const std::vector<uint32_t> all = subset_of_pixels(order_, paths / pilot_samples_);
@@ -226,9 +227,9 @@ class Trainer {
     return view;
   }
 
-  /// Returns whether training pays after `round`, and measures the gain in efficiency of the
-  /// current field. `without` is a pilot render without guiding: of the first pixels in round 0,
-  /// which adds the other pixels if they are needed.
+  /// Returns whether training is worthwhile after `round`, and measures the gain in efficiency of
+  /// the current field. `without` is a pilot render without guiding. In round 0 it has only the
+  /// first pixels, and this function adds the other pixels if needed.
   bool pays(uint32_t round, PilotRender& without) {
     if (!tiles_->is_lit() || field_->facts().regions == 0) return false;
     const GuidingView guide = view();
@@ -258,7 +259,8 @@ class Trainer {
     if (path > 0) image_paths_ = static_cast<double>(samples_) * without.cost_of_sample() / path;
   }
 
-  /// Returns the most training paths for a render that will be guided, from the speed so far.
+  /// Returns the maximum number of training paths for a render that will be guided, estimated from
+  /// the speed so far.
   uint64_t max_paths() const {
     const uint64_t most = std::min(samples_of(settings_) / kTrainingShare, kMaxTrainingPaths);
     if (!is_timed()) return std::min(most, as_count(image_paths_ / kTrainingShare));

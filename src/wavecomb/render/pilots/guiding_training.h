@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Trains the guiding field before the first pass.
 ///
-/// Camera paths over the whole image are traced in rounds, each with twice as many paths as the one
-/// before. The first round samples the BSDFs only, the others use the field of the rounds before.
-/// The result does not depend on seed, region, threads, waves or lanes, so that crops, resumed
-/// renders and merged renders are guided by the same field. Training paths do not contribute to the
-/// image, because a field built from the samples that it guides would bias them.
+/// Camera paths over the whole image are traced in rounds, each with twice as many paths as the
+/// previous round. The first round only samples BSDFs, and each later round uses the field of the
+/// previous rounds. The result does not depend on seed, region, threads, waves or lanes, so that
+/// crops, resumed renders and merged renders are guided by the same field. Training paths do not
+/// contribute to the image, because samples would be biased if a field built from them also guided
+/// them.
 #pragma once
 
 #include <functional>
@@ -28,8 +29,8 @@ struct GuidingStatistics {
   uint64_t paths = 0;            ///< training paths; 0 if nothing was learned
   uint32_t rounds = 0;
   uint64_t field_bytes = 0;
-  /// For Guiding::kAuto: efficiency with the field over efficiency without, measured in pilot
-  /// renders, or 0 if unknown.
+  /// For Guiding::kAuto: ratio of the efficiency with the field to the efficiency without it,
+  /// measured in pilot renders, or 0 if unknown.
   double gain = 0;
   /// Expected fraction of vertices at which a path survives learned roulette.
   double survival = 1;
@@ -46,7 +47,8 @@ struct GuidingTraining {
   GuidingStatistics statistics;
 };
 
-/// Returns the device layout of the field and of the tiles. Contract: valid as long as `training`.
+/// Returns the device layout of the field and of the tiles. The result is valid as long as
+/// `training` exists.
 GuidingView view_of(const GuidingTraining& training);
 
 /// Returns the grid of a scene's guiding field.

@@ -25,9 +25,10 @@ constexpr uint32_t kMaxPaths = 16384, kMinPaths = 1024, kPixelsOfPath = 4;
 /// Number of vertices of a calibration path at which a light is selected.
 constexpr uint32_t kVertices = 3;
 constexpr size_t kChunk = 128;
-/// Light tree nodes above this depth are balanced.
+/// Calibration changes the selection odds of light tree nodes whose depth is below this value.
 constexpr uint32_t kTiltDepth = 6;
-/// Largest light tree whose nodes are balanced: the nodes are copied, 64 bytes for each light.
+/// Number of lights up to which the odds of nodes are changed. The nodes are copied, which takes 64
+/// bytes for each light.
 constexpr size_t kMaxTilted = size_t{1} << 20;
 
 uint32_t path_count(const Settings& settings) {
@@ -47,7 +48,8 @@ std::vector<uint32_t> spread_pixels(const Settings& settings, uint32_t count) {
   return pixels;
 }
 
-/// Returns the changed odds of the upper tree nodes, from the samples that passed through them.
+/// Returns the new selection odds of the upper light tree nodes, estimated from the samples that
+/// passed through these nodes.
 std::vector<NodeTilt> balance_nodes(const LightTreeView& tree, const LightProbes& probes,
                                     std::span<const double> scales) {
   std::unordered_map<uint32_t, size_t> index;

@@ -6,7 +6,7 @@
 namespace wavecomb {
 namespace {
 
-/// Returns the training that a render uses: a new one, or that of an earlier render.
+/// Returns the guiding training that a render uses, which may come from an earlier render.
 std::shared_ptr<const GuidingTraining> training_for(const PilotInput& input,
                                                     const WaveContext& context, PilotCache& cache) {
   if (!input.learned.empty()) {

@@ -16,17 +16,17 @@ namespace {
 /// Largest fraction of a time limit that pilot renders for the transport may take.
 constexpr double kPilotShare = 0.05;
 
-/// Predicted gain of light paths from which guiding is not considered. Smaller gains are compared,
-/// because guiding and light paths exclude each other.
+/// If the predicted gain of light paths reaches this value, guiding is not considered. A smaller
+/// gain is compared with the gain of guiding, because guiding and light paths exclude each other.
 constexpr double kSureGain = 4;
 
-/// Decides those settings that need no pilot render.
+/// Decides the settings that need no pilot render.
 Settings without_open_choices(Settings used) {
   if (used.quality == Quality::kPlain) {
     if (used.guiding == Guiding::kAuto) used.guiding = Guiding::kOff;
     if (used.transport == Transport::kAuto) used.transport = Transport::kPath;
   }
-  // Roulette by efficiency needs training whether or not guiding helps.
+  // Roulette by efficiency needs training, even if guiding does not help.
   if (used.roulette == RouletteKind::kEfficient && used.guiding == Guiding::kAuto)
     used.guiding = Guiding::kOff;
   if (used.transport == Transport::kAuto) return used;

@@ -4,14 +4,15 @@
 /// 1. Settings that need no measurement are decided first, such as plain quality.
 /// 2. Small renders of the whole view compare ratios of light paths (transport_choice.h in
 ///    light_paths/render).
-/// 3. Where light paths promise little, guiding is trained too, and the larger predicted gain
-///    counts, because guiding and light paths exclude each other.
-/// 4. The pilots of the render with the decided settings follow (pilots.h). They decide about
-///    guiding, and measure lights, material costs and directions for light paths.
+/// 3. If the predicted gain of light paths is small, guiding is trained as well. The technique with
+///    the larger predicted gain is used, because guiding and light paths exclude each other.
+/// 4. The pilots of the render with the decided settings follow (pilots.h). They decide whether
+///    to use guiding, and measure lights, material costs and directions for light paths.
 ///
 /// Decisions depend only on counted samples of the whole image, and never on seed, region, threads
 /// or the clock, so that tiles, crops, resumed renders and merged renders make the same decisions.
-/// The one exception is a time limit, whose pilots stop after a fraction of it.
+/// The only exceptions are renders with a time limit, whose pilots stop after a fraction of the
+/// limit.
 #pragma once
 
 #include <functional>
@@ -33,17 +34,16 @@ struct PlannedSettings {
 
 /// Planner of the renders of one scene.
 ///
-/// Contract: used by one thread at a time. `cache` must outlive the planner, which reuses earlier
-/// decisions.
+/// Contract: used by one thread at a time. The planner reuses earlier decisions from `cache`, which
+/// must outlive the planner.
 class Planner {
  public:
-  /// `build_s` is the time in seconds in which `accel` was built.
+  /// `build_s` is the time in seconds that building `accel` took.
   Planner(std::shared_ptr<const Scene> scene, std::shared_ptr<const EmbreeAccelerator> accel,
           double build_s, PilotCache& cache);
 
-  /// Decides the transport for `settings`. `options` may hold the decisions of an earlier render,
-  /// which are then taken over. Gives up if `stopped` returns true; the result then uses
-  /// Transport::kPath.
+  /// Decides the transport for `settings`. If `options` holds the decisions of an earlier render,
+  /// they are reused. Gives up if `stopped` returns true; the result then uses Transport::kPath.
   PlannedSettings plan(const Settings& settings, const RenderOptions& options,
                        const std::function<bool()>& stopped);
 

@@ -127,7 +127,8 @@ PackedChoice read_choice(ByteReader& reader) {
   return choice;
 }
 
-/// Returns the settings with those that do not affect training reset to their defaults.
+/// Returns a copy of the settings in which all settings that do not affect training have their
+/// defaults.
 Settings training_settings(Settings settings) {
   const Settings fresh;
   settings.seed = fresh.seed;
@@ -151,8 +152,9 @@ Settings training_settings(Settings settings) {
   return settings;
 }
 
-/// Returns the settings with those that do not affect the choice of the transport reset to their
-/// defaults. AOVs and light path expressions are not reset, since some exclude light paths.
+/// Returns a copy of the settings in which all settings that do not affect the choice of the
+/// transport have their defaults. AOVs and light path expressions are not reset, since some exclude
+/// light paths.
 Settings choice_settings(const Settings& settings) {
   Settings kept = training_settings(settings);
   kept.aovs = settings.aovs;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Reuse of a training and of the choice of the transport by later renders, which skip their own
-/// pilot renders: as bytes in a checkpoint, or in memory when a scene is rendered again.
+/// Reuse of a training and of the choice of the transport by later renders, which then skip their
+/// pilot renders. The data is stored as bytes in a checkpoint, or in memory if a scene is rendered
+/// again.
 #pragma once
 
 #include <cstddef>
@@ -17,22 +18,22 @@
 namespace wavecomb {
 
 /// Serializes a training and the choice of the transport, if there is one. The result has the size
-/// of the guiding field plus a few hundred bytes, or no bytes if nothing was chosen or trained,
-/// because the settings fix the choice, or the render is too short or was stopped.
+/// of the guiding field plus a few hundred bytes, or no bytes if nothing was chosen or trained.
+/// This happens if the settings fix the choice, if the render is too short, or if it was stopped.
 std::vector<std::byte> packed_training(const GuidingTraining& training,
                                        const std::optional<TransportChoice>& transport);
 
 /// Restores the training that packed_training() wrote, for the same scene and image size. Throws
-/// Error if `bytes` are damaged or of another version or build.
+/// Error if `bytes` are damaged or come from another version or build.
 GuidingTraining unpacked_training(std::span<const std::byte> bytes, const Scene& scene,
                                   const Settings& settings);
 
 /// Returns the choice of the transport that packed_training() wrote; Transport::kPath if there is
-/// none. Throws Error if `bytes` are damaged or of another version or build.
+/// none. Throws Error if `bytes` are damaged or come from another version or build.
 TransportChoice unpacked_transport(std::span<const std::byte> bytes);
 
-/// Cache of the last choice of the transport, reused by renders of the same scene whose settings
-/// lead to the same choice: seed, region and scheduling may differ.
+/// Cache of the last choice of the transport. Renders of the same scene reuse the choice if their
+/// settings lead to the same choice; seed, region and scheduling may differ.
 ///
 /// Contract: one thread at a time.
 class TransportChoiceCache {
@@ -49,8 +50,8 @@ class TransportChoiceCache {
   std::optional<TransportChoice> last_;
 };
 
-/// Cache of the last training, reused by renders of the same scene whose settings lead to the same
-/// training: seed, region, layers and scheduling may differ.
+/// Cache of the last training. Renders of the same scene reuse the training if their settings lead
+/// to the same training; seed, region, layers and scheduling may differ.
 ///
 /// Contract: one thread at a time.
 class GuidingTrainingCache {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Measured shading costs by name.
+/// Measured shading costs of materials and textures by name.
 #pragma once
 
 #include <string>

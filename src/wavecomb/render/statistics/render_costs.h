@@ -15,7 +15,7 @@ namespace wavecomb {
 
 /// Measured and predicted shading costs of a render.
 ///
-/// Contract: waves read `order` and `roulette` during a pass; they are written only between passes.
+/// Contract: waves read `order` and `roulette` during a pass; both change only between passes.
 class RenderCosts {
  public:
   RenderCosts(const Scene& scene, std::span<const MaterialTraits> traits, const Settings& settings);

@@ -30,11 +30,11 @@ struct MaterialStatistics {
   uint64_t timed_records = 0;
   double measured_ns = 0;    ///< mean of the timed records; 0 if none was timed
   double calibrated_ns = 0;  ///< cost before the first pass
-  double predicted_ns = 0;   ///< cost that the next pass would be scheduled by
+  double predicted_ns = 0;   ///< cost that would determine scheduling in the next pass
 };
 
-/// Selection probability of a light or group of lights: as used by the render, and if selection
-/// were by power alone.
+/// Selection probability of a light or a group of lights in the render, and the probability if
+/// lights were selected by power alone.
 struct LightShare {
   std::string name;
   double share, by_power;
@@ -45,7 +45,7 @@ struct LightShares {
   double seconds = 0;
   uint32_t paths = 0;         ///< number of calibration paths; 0 if there was nothing to calibrate
   bool kept = false;          ///< whether the calibration was taken over from an earlier render
-  uint32_t tilted_nodes = 0;  ///< light tree nodes with changed odds
+  uint32_t tilted_nodes = 0;  ///< number of light tree nodes with changed selection odds
   std::vector<LightShare> parts;
 };
 
@@ -70,11 +70,12 @@ struct RenderStatistics {
   uint32_t threads = 0, wave_size = 0, lanes = 0;
   uint32_t passes = 0;  ///< begun
   WorkDistribution sharing;
-  uint64_t resumed_samples = 0;  ///< samples from a checkpoint; not in `samples`
+  uint64_t resumed_samples = 0;  ///< samples from a checkpoint, which are not included in `samples`
   double error = 0;              ///< mean relative error of the image; infinite if unknown
   SceneBytes scene_bytes;
   uint64_t accelerator_bytes = 0, wave_bytes = 0, film_bytes = 0, peak_rss_bytes = 0;
-  bool cancelled = false;  ///< stopped by the caller; false if a time limit ended the render
+  /// Whether the caller stopped the render; false if a time limit ended it.
+  bool cancelled = false;
   // Counts by path depth; the last entry includes all deeper vertices.
   std::vector<uint64_t> rays_at, shadow_rays_at, records_at;
   double run_length = 0, material_homogeneity = 0, texture_homogeneity = 0;
@@ -82,15 +83,16 @@ struct RenderStatistics {
   double cost_r2 = 0,
          cost_mean_error =
              0;  ///< accuracy of cost predictions, in the last pass that had predictions
-  uint64_t cost_materials = 0;  ///< materials with a prediction and a measurement
-  std::vector<std::pair<std::string, uint64_t>> policy_uses;  ///< queues ordered by each policy
+  uint64_t cost_materials = 0;  ///< number of materials with both a prediction and a measurement
+  /// Number of queues that each policy ordered.
+  std::vector<std::pair<std::string, uint64_t>> policy_uses;
   double calibration_s = 0;
   LightShares light_calibration;
   AllocationStatistics allotment;
   GuidingStatistics guiding;
   AimStatistics light_aiming;
-  std::vector<std::string>
-      lights_without_paths;  ///< names of lights that emit no light paths, if other lights do
+  /// Names of lights that emit no light paths; empty in renders without light paths.
+  std::vector<std::string> lights_without_paths;
   std::optional<TransportChoice> transport;      ///< for Transport::kAuto
   std::optional<StoreStatistics> texture_store;  ///< set if texture memory has a limit
 };

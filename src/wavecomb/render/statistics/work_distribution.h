@@ -14,11 +14,11 @@ inline constexpr std::array<uint32_t, 7> kThreadCounts = {1, 2, 4, 8, 16, 32, 64
 
 /// Work distribution, added up over the passes of a render.
 ///
-/// A pass ends when its last group ends, so it takes at least as long as its longest group, and at
-/// least the mean over its threads. The duration of a pass is predicted by list scheduling, in
-/// which each free thread takes the next group of the plan (Graham 1969: at most 2 - 1 / threads
-/// times the optimum). The prediction uses the measured durations of the groups, so it ignores that
-/// more threads share caches, memory bandwidth and clock.
+/// A pass ends when its last group ends, so it takes at least as long as the longest group, and at
+/// least as long as the mean work of a thread. The duration of a pass is predicted by list
+/// scheduling, in which each free thread takes the next group of the plan (Graham 1969: at most 2 -
+/// 1 / threads times the optimum). The prediction uses the measured durations of the groups, so it
+/// ignores that more threads have to share caches, memory bandwidth and clock speed.
 class WorkDistribution {
  public:
   /// Adds a pass whose groups took `group_s` seconds each, in the order of its plan.

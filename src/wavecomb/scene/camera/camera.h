@@ -16,7 +16,7 @@ enum class Projection : uint32_t {
   kLatlong,  ///< equirectangular, all directions: longitude to the right, latitude up
 };
 
-/// Policy for windows whose aspect ratio differs from the image's: UsdRender's
+/// Adaptation of a window to an image of a different aspect ratio, as by UsdRender's
 /// aspectRatioConformPolicy.
 enum class Conform : uint32_t {
   kExpandAperture,
@@ -37,12 +37,12 @@ struct Camera {
   /// camera moves. The list is empty if the camera is static at `to_world`.
   std::vector<Affine> steps{};
   Projection projection = Projection::kPerspective;
-  /// Visible region: x from window[0] to window[1], y from window[2] to window[3]. A perspective
-  /// camera measures the window on the plane z = -1, an orthographic camera perpendicular to its
-  /// axis in scene units, and a latlong camera as longitude and latitude in radians with (0, 0)
-  /// along -z.
+  /// Visible region: x from window[0] to window[1], y from window[2] to window[3]. For a
+  /// perspective camera, the window lies on the plane z = -1. For an orthographic camera, it is
+  /// perpendicular to the axis and in scene units. For a latlong camera, it is given by longitude
+  /// and latitude in radians, with (0, 0) along -z.
   float window[4] = {-0.5f, 0.5f, -0.5f, 0.5f};
-  /// Ignored by latlong cameras, which stretch the window to the image.
+  /// Latlong cameras ignore this policy and stretch the window to the image.
   Conform conform = Conform::kExpandAperture;
   float pixel_aspect = 1;    ///< width / height of a pixel
   float lens_radius = 0;     ///< 0 gives a pinhole camera; ignored by latlong cameras
@@ -50,7 +50,7 @@ struct Camera {
   float near_clip = 0;       ///< distances along -z; radial distances for latlong cameras
   float far_clip = 1e30f;
   /// Clipping planes (a, b, c, d) in camera space. Camera rays ignore points with a x + b y + c z +
-  /// d < 0; all other rays see them.
+  /// d < 0; rays of all other kinds can hit these points.
   std::vector<std::array<float, 4>> clip_planes{};
   float exposure = 1;           ///< factor applied to the radiance of the image
   float aperture_blades = 0;    ///< polygon corners of the aperture, 3 or more; 0 gives a disk
@@ -59,10 +59,10 @@ struct Camera {
   /// Coefficients of Brown's lens distortion model (path/camera/lens.h), on the plane at
   /// distance 1.
   float lens_k1 = 0, lens_k2 = 0, lens_k3 = 0, lens_p1 = 0, lens_p2 = 0;
-  /// Lens distortion as a map, used instead of the coefficients above: n x n nodes over the image
-  /// with n even, row by row, two nodes in each array of four values. A node holds the position of
-  /// its ray in the undistorted image, from the upper left corner, in fractions of the image width
-  /// and height.
+  /// Lens distortion as a map, used instead of the coefficients above. The map has n x n nodes over
+  /// the image, where n is even, row by row. Each array of four values holds two nodes. A node
+  /// holds the position of its ray in the undistorted image, from the upper left corner, in
+  /// fractions of the image width and height.
   std::vector<std::array<float, 4>> lens_map{};
   RollingShutter rolling_shutter = RollingShutter::kOff;
   /// Fraction of the shutter interval for which a rolling shutter exposes each pixel row.

@@ -90,13 +90,13 @@ std::vector<CameraParameter> make_camera_parameters() {
           "lens_radius", 0, "Lens radius in scene units; 0 gives a pinhole camera.")),
       counted(distance<&C::focus_distance>("focus_distance",
                                            "Distance of the focal plane along -z in scene units; "
-                                           "must be above 0 if the lens radius is.")),
-      counted(number_from<&C::near_clip>(
-          "near_clip", 0,
-          "Near clipping distance in scene units, along -z, or radial for a latlong camera.")),
-      counted(distance<&C::far_clip>(
-          "far_clip",
-          "Far clipping distance in scene units, along -z, or radial for a latlong camera.")),
+                                           "must be above 0 if the lens radius is above 0.")),
+      counted(number_from<&C::near_clip>("near_clip", 0,
+                                         "Near clipping distance in scene units: along -z, or from "
+                                         "the centre of a latlong camera.")),
+      counted(distance<&C::far_clip>("far_clip",
+                                     "Far clipping distance in scene units: along -z, or from the "
+                                     "centre of a latlong camera.")),
       counted(needed(row<&C::window>(
           "window",
           "Visible region (x0, x1, y0, y1) of a camera: on the plane z = -1 for perspective, in "
@@ -128,10 +128,10 @@ std::vector<CameraParameter> make_camera_parameters() {
       row<&C::lens_k3>("lens_k3", "Coefficient of r^6 in the radial lens distortion."),
       row<&C::lens_p1>("lens_p1", "First coefficient of the tangential lens distortion."),
       row<&C::lens_p2>("lens_p2", "Second coefficient of the tangential lens distortion."),
-      row<&C::lens_map>(
-          "lens_map",
-          "Lens distortion as a map of n x n nodes, two per row of four numbers; a node is a "
-          "position in fractions of the undistorted image's width and height."),
+      row<&C::lens_map>("lens_map",
+                        "Lens distortion map of n x n nodes, two in each row of four numbers; a "
+                        "node is a position in the undistorted image, in fractions of its width "
+                        "and height."),
       choice<&C::rolling_shutter>("rolling_shutter", {"off", "top", "bottom", "left", "right"},
                                   "Image edge at which the exposure of a rolling shutter begins."),
       number_from<&C::rolling_duration>(

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Table of camera parameters other than the transform: one row for each member of Camera. Range
-/// checks, the scene fingerprint, the Python keywords and their stub, and the camera poses that the
-/// window sets are derived from the table. To add a parameter, add a member, a row here, and the
-/// code that uses the parameter.
+/// Table of camera parameters other than the transform: one row for each member of Camera. The
+/// table determines the range checks, the scene fingerprint, the Python keywords with their stub,
+/// and the camera values that the interactive window sets. To add a parameter, add a member, a row
+/// here, and the code that uses the parameter.
 #pragma once
 
 #include <array>
@@ -18,7 +18,7 @@
 namespace wavecomb {
 
 using FourNumbers = std::array<float, 4>;
-/// Value of a camera parameter. A choice is stored as its index.
+/// Value of a camera parameter. The value of a choice is an index.
 using CameraValue = std::variant<float, uint32_t, FourNumbers, std::vector<FourNumbers>>;
 
 /// Alternatives of CameraValue, in the same order.
@@ -42,7 +42,7 @@ struct CameraParameter {
   void (*write)(Camera&, const CameraValue&) = nullptr;
 
   CameraValue standard() const { return read(Camera{}); }
-  /// Throws Error naming the parameter unless its value is in range.
+  /// Throws Error with the name of the parameter if its value is out of range.
   void check(const Camera& camera) const;
 };
 

@@ -4,10 +4,10 @@
 namespace wavecomb {
 namespace {
 
-/// Sorts by program, and within a program by material if textures or a value graph drive its
-/// inputs, since a packet evaluates the textures and graphs of different materials one after
-/// another. If all materials are constant, the keys equal those of "program", and the sort takes a
-/// single pass.
+/// Sorts by program. Within a program, materials with textures or value graphs are sorted by
+/// material, since a packet evaluates the textures and graphs of different materials one after
+/// another. If all materials are constant, the keys are the same as for "program", and the sort
+/// takes a single pass.
 class CodePolicy final : public SchedulingPolicy {
  public:
   std::string_view name() const override { return "code"; }

@@ -4,8 +4,8 @@
 namespace wavecomb {
 namespace {
 
-/// Placebo: the same runs as "material", but in a pseudo-random order. Any benefit of ordering runs
-/// must be measured against this policy.
+/// Control for experiments: the same runs as "material", but in a pseudo-random order. Any benefit
+/// of ordering runs must be measured against this policy.
 class RandomRunsPolicy final : public SchedulingPolicy {
  public:
   std::string_view name() const override { return "random-runs"; }
@@ -13,7 +13,8 @@ class RandomRunsPolicy final : public SchedulingPolicy {
              std::span<uint64_t> keys) const override {
     const uint32_t salt = queue.depth * 0x9e3779b9u + static_cast<uint32_t>(queue.size());
     for (size_t i = 0; i < queue.size(); ++i) {
-      // Programs stay together, as in every other policy, so that lane utilisation is the same.
+      // Records of a program stay together, as with every other policy, so that lane utilisation is
+      // the same.
       const uint32_t program = mix(queue.program[i] + salt) & 0xffu;
       const uint32_t run = mix(queue.material[i] * 0x85ebca6bu + salt);
       keys[i] = (uint64_t{program} << 56) | (uint64_t{queue.program[i]} << 48) |

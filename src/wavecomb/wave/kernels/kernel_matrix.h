@@ -20,16 +20,16 @@ namespace wavecomb {
 ///
 /// `reduced` lists the widths in builds with WAVECOMB_REDUCED_KERNELS, such as sanitized builds.
 /// With `none`, reduced builds run `program` kernels instead. With `first`, the first program has
-/// kernels of every width, and all other programs have only scalar kernels, which then also shade
-/// the packets of waves. Reduced builds trace waves through volumes in scalar lanes. `gain` states
-/// the measured benefit over the kernel that would otherwise run, or `-` and a reason if there is
-/// no such kernel.
+/// kernels of every width. All other programs have only scalar kernels, which then also shade the
+/// packets of waves. Reduced builds trace waves through volumes in scalar lanes. `gain` states the
+/// measured benefit over the kernel that would run without this row, or `-` and a reason if there
+/// is no such kernel.
 ///
-/// All kernels give bit-identical results. A kernel without some feature (features.h) runs only for
+/// All kernels give bit-identical results. A kernel that lacks a feature (features.h) runs only for
 /// scenes and materials that do not use this feature.
 ///
-/// The table has no separate kernels for camera paths that are combined with light paths (`program`
-/// handles them by a flag), and no plain kernels or variants for light paths, since one general
+/// Camera paths that are combined with light paths have no separate kernels, since `program`
+/// kernels handle them by a flag. Light paths have no plain kernels or variants, since one general
 /// kernel is enough.
 #define WAVECOMB_KERNELS(X)                                                                       \
   X(program, programs, every, first, "-: general, and those of the reference integrator")         \
@@ -57,15 +57,15 @@ constexpr bool has_program_kernels(size_t program, size_t lanes) {
   return !WAVECOMB_REDUCED_KERNELS || lanes == 1 || program == 0;
 }
 
-/// Whether waves that use SIMD packets also trace volumes in packets; if not, they use scalar
-/// lanes.
+/// Whether waves in SIMD packets also trace volumes in packets; if not, volumes are traced in
+/// scalar lanes.
 inline constexpr bool kHasVolumePackets = !WAVECOMB_REDUCED_KERNELS;
 
-/// Whether the build has kernels of the kind `plain` for packets of F.
+/// Whether this build has `plain` kernels for the lane type F.
 template <typename F>
 inline constexpr bool kHasPlain = has_kernels("plain", kWidth<F>);
 
-/// Lane type of the kernels for light paths. It does not depend on the lane width of the wave.
+/// Lane type of the kernels for light paths, whatever the lane width of the wave.
 using LightLanes =
     Lanes<has_kernels("light", WAVECOMB_MAX_LANES) ? size_t{WAVECOMB_MAX_LANES} : size_t{1}>;
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Tables of shading kernels, indexed by program id. Each kernel is compiled in a separate unit
-/// (kernel_matrix.h); this header only declares them.
+/// (kernel_matrix.h); this header only declares the kernels.
 #pragma once
 
 #include <array>
@@ -74,9 +74,9 @@ constexpr auto vertex_kernels(ProgramList<Bsdf...>) {
 }
 }  // namespace detail
 
-/// Shading kernels of a list of programs. Waves use `shade_batch`, indexed by variant; all variants
-/// of a program have the same kernel. The reference integrator uses `shade_vertex`, indexed by
-/// ProgramId.
+/// Shading kernels of a list of programs. Waves use `kShadeBatch`, which is indexed by variant and
+/// has the same kernel for all variants of a program. The reference integrator uses `kShadeVertex`,
+/// which is indexed by ProgramId.
 template <typename F, typename List>
 inline constexpr auto kShadeBatch = detail::batch_kernels<F>(List{});
 template <typename F, typename List>

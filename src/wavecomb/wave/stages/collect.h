@@ -26,7 +26,7 @@ struct RayPacket {
   F t;  ///< distance of the hit or volume event
   // Masks of rays that leave the scene, that hit the shape of a light, and that hit a surface.
   Mask<F> missed, shape, surface;
-  // Row and state of the paths; loaded only in lanes that need them.
+  // Row and state of the paths; loaded only in lanes that need the path.
   PathRow<F> path;
   PathState<F> state;
 
@@ -45,8 +45,8 @@ struct RayPacket {
   Vec3<F> end() const { return fma(d, t, o); }
 };
 
-/// Adds the emission of volumes along the rays of a packet, and samples its free flights. Needs
-/// `p.path`.
+/// Adds the emission of volumes along the rays of a packet, and samples the free flights of the
+/// rays. Needs `p.path`.
 template <typename F, typename Media>
 WAVECOMB_INLINE Flight<F> fly_packet(Wave& wave, const PathEvents& events,
                                      const ShadeSettings& settings, uint32_t depth,
@@ -111,7 +111,8 @@ WAVECOMB_INLINE void add_ended(const Wave& wave, const PathEvents& events, const
       {depth, p.slot, c}, [&] { return light; }, p.shape & not_(is_black(c)));
 }
 
-/// Returns the ends of a packet of camera rays. The shutter times are 0 if nothing moves.
+/// Returns the end points of a packet of camera rays, with their shutter times (0 if nothing
+/// moves).
 template <typename F>
 WAVECOMB_INLINE RayEnd<F> ray_end(const Wave& wave, const WaveContext& context,
                                   const RayPacket<F>& p) {

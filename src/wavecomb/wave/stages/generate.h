@@ -26,8 +26,8 @@ const float* generate(Wave& wave, const WaveContext& context, const WaveTask& ta
   for (uint32_t i = 0; i < n; i += kWidth<F>) {
     const Mask<F> active = first_lanes<F>(n - i);
     const U slot = lane_index<F>() + i;
-    // Compute slot / samples by a reciprocal, which is exact because slots are below 2^20 and
-    // adding 0.5 keeps quotients away from integers.
+    // Compute slot / samples by a reciprocal. The result is exact because slots are below 2^20, and
+    // because the added 0.5 keeps quotients away from integers.
     const U index = U(to_int<F>((F(Int<F>(slot)) + 0.5f) * inv_samples));
     const U pixel = gather<U>(task.pixels, index, Mask<U>(active));
     const U sample = slot - index * task.samples + task.first_sample;

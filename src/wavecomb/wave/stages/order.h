@@ -30,8 +30,8 @@ UInt<F> texture_key(const SceneView& scene, const MeshHit<F>& hit, const F& cone
   const U cell = morton_2<U>(U(to_int<F>(F((u - fu) * 128.f))) & 0x7fu,
                              U(to_int<F>(F((v - fv) * 128.f))) & 0x7fu);
   const F density = gather_member<F>(scene.meshes, &MeshRecord::uv_density, hit.mesh, active);
-  // Mip level of a texture with 2^15 texels per side, floor(log2(width)) + 15, from the exponent of
-  // the footprint width.
+  // The exponent of the footprint width gives the mip level of a texture with 2^15 texels per side:
+  // floor(log2(width)) + 15.
   const F width = clamp(F(cone_width * density), F(0x1p-15f), F(1.f));
   const U level = ((float_bits<F>(width) >> 23) - 112u) & 0xfu;
   return select(Mask<U>(has_uv), (tile << 18) | (level << 14) | cell, U(0u));
@@ -60,8 +60,8 @@ void fill_columns(Wave& wave, const WaveContext& context, uint32_t wanted) {
   }
 }
 
-/// Numbers of packets that shading needs for a queue: with records in arrival order, and with
-/// records grouped by program.
+/// Number of packets that shading needs for a queue, if records are in arrival order and if records
+/// are grouped by program.
 struct PacketEstimate {
   double arrival = 0, grouped = 0;
 };
@@ -144,8 +144,8 @@ OrderChoice order_records(Wave& wave, const WaveContext& context, uint32_t depth
 }
 
 /// Adds every seventeenth shading queue to the coherence statistics, with records in shading order.
-/// The interval is a prime number, since waves of 8 or 16 depths would otherwise always measure the
-/// same depth.
+/// The interval is a prime number, since waves with 8 or 16 depths would otherwise be measured
+/// always at the same depth.
 template <typename F>
 void watch_coherence(Wave& wave, const WaveContext& context) {
   if (wave.queues % 17 != 1) return;

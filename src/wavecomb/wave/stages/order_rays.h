@@ -19,7 +19,8 @@ inline UInt<F> position_key(const OrderGrid& grid, const Vec3<F>& p) {
   return morton_3<U>(axis(p.x, 0), axis(p.y, 1), axis(p.z, 2));
 }
 
-/// Threshold above which a component of a unit direction counts as long; about 1 / sqrt(3).
+/// A component of a unit direction counts as long if its magnitude is above this threshold, which
+/// is about 1 / sqrt(3).
 inline constexpr float kLong = 0.6f;
 
 /// Returns a six-bit key of a direction: three bits for its octant, and one bit for each component
@@ -34,8 +35,8 @@ inline UInt<F> direction_key(const Vec3<F>& d) {
 }
 
 /// Computes the sort keys of the rays in the pool rows of `slot`: the Morton code of the origin,
-/// preceded by the octant of the direction if `by_octant`. `rows` may hold path rows or shadow ray
-/// rows, since both start with origin and direction.
+/// preceded by the octant of the direction if `by_octant` is true. `rows` may hold path rows or
+/// shadow ray rows, since both start with origin and direction.
 template <typename F>
 void ray_keys(const float* rows, const uint32_t* slot, size_t n, const OrderGrid& grid,
               bool by_octant, uint64_t* keys) {
@@ -46,8 +47,8 @@ void ray_keys(const float* rows, const uint32_t* slot, size_t n, const OrderGrid
     const Mask<F> active = first_lanes<F>(n - i);
     const auto ray = load_head<RayHead, PathRow, F>(rows, load<U>(slot + i), active);
     U key = position_key<F>(grid, ray.o);
-    // The octant needs three bits: the two unused bits of the key and the lowest bit of the Morton
-    // code, which matters less.
+    // The octant needs three bits. It takes the two unused bits of the key, and replaces the lowest
+    // bit of the Morton code, which matters less.
     if (by_octant) key = ((direction_key<F>(ray.d) >> 3) << 29) | (key >> 1);
     store(lanes, key);
     const size_t m = std::min(kWidth<F>, n - i);

@@ -27,8 +27,8 @@ struct RecordPacket {
                              : load<U>(queue.uints(Q::kMaterial) + i);
   }
 
-  /// Stores the shading outcomes: which paths continue, in direction `next`, and which paths have a
-  /// shadow ray, in direction `shadow`.
+  /// Stores the shading outcomes. Paths in the lanes `alive` continue in direction `next`, and
+  /// paths in the lanes `has_shadow` have a shadow ray in direction `shadow`.
   void store(const ShadingQueue& queue, const Mask<F>& alive, const Vec3<F>& next,
              const Mask<F>& has_shadow, const Vec3<F>& shadow) const {
     using Q = ShadingQueue;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Wave stage 5: adds the radiance of all paths to the film. The samples of a pixel are added in
+/// Wave stage 5: adds the radiance of all paths to the film. The samples of each pixel are added in
 /// sample order.
 #pragma once
 
@@ -19,8 +19,8 @@ inline void add_rows(const float* rows, size_t first, size_t end, double (&sum)[
     for (size_t c = 0; c < N; ++c) sum[c] += double{rows[s * N + c]};
 }
 
-/// Adds the radiance of slots [first, end) to the error sums of `pixel`. Must run before the film
-/// adds these samples to the pixel.
+/// Adds the radiance of slots [first, end) to the error sums of `pixel`. Call this function before
+/// the film adds these samples to the pixel.
 inline void add_errors(const float* rows, size_t first, size_t end, const Film::Pixel& pixel,
                        ErrorSums& errors) {
   double sum[3] = {pixel.r, pixel.g, pixel.b};

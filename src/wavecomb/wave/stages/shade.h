@@ -8,8 +8,8 @@
 
 namespace wavecomb {
 
-/// Largest number of records in a batch. The columns of a batch fit into the L1 cache. Time is
-/// measured once per batch.
+/// Maximum number of records in a batch. With this size, the columns of a batch fit into the L1
+/// cache. Time is measured once per batch.
 inline constexpr size_t kMaxBatch = 256;
 
 /// Returns the end of the batch that starts at `begin`. All records of a batch have the same
@@ -47,8 +47,8 @@ inline void charge_batch(Wave& wave, size_t begin, size_t end,
   wave.costs.charge({materials.data(), end - begin}, ns);
 }
 
-/// For the cost AOV, adds either the measured time of a batch or the modelled costs of its
-/// materials to the paths of the batch.
+/// Adds costs to the paths of a batch for the cost AOV: either the measured time of the batch or
+/// the modelled costs of its materials.
 inline void spread_batch(Wave& wave, const WaveContext& context, size_t begin, size_t end,
                          PhaseClock::Clock::time_point start) {
   const ShadingQueue& queue = wave.shading;
@@ -62,7 +62,7 @@ inline void spread_batch(Wave& wave, const WaveContext& context, size_t begin, s
                        context.roulette_costs->material(material[record_index(queue, begin + i)]));
 }
 
-/// Returns whether plain kernels have all features that the scene and the settings use.
+/// Returns whether the plain kernels support all features that the scene and the settings use.
 inline bool is_plain(const WaveContext& context, const ShadeSettings& settings) {
   const SceneView& scene = context.scene;
   return !context.joint.is_active() && !scene.has_motion && !scene.has_curves && !context.links() &&
@@ -98,8 +98,8 @@ void shade(Wave& wave, const WaveContext& context, const ShadeSettings& settings
   }
 }
 
-/// Appends rays of the records from index `i` to `list`, for records whose outcome includes `what`.
-/// `n` is the number of rays in `list`.
+/// From the packet of records that starts at index `i`, appends the rays of the records with
+/// outcome `what` to `list`. `n` is the number of rays in `list`.
 template <typename F, typename List>
 WAVECOMB_INLINE void list_rays(const ShadingQueue& queue, size_t i, List& list, size_t& n,
                                ShadingQueue::Outcome what, uint32_t shift) {

@@ -63,10 +63,10 @@ WAVECOMB_INLINE void store_rays(const PathPool& pool, const VertexResult<F>& v,
     store_row<PathRow, F>(pool.paths, slot, path_row<kMayEnter, F>(v.next, key), v.alive);
 }
 
-/// Shades records [begin, end) of the shading order, one packet at a time. All of these records
-/// have the variant `Bsdf`. In the path pool, the next ray of a path overwrites its previous ray.
-/// Outcomes are stored in arrival order. `Joint` is the transport that may be combined with camera
-/// paths (path/joint_transport.h).
+/// Shades the records [begin, end) of the shading order, one packet at a time. All of these records
+/// use the variant `Bsdf`. In the path pool, the next ray of a path overwrites its previous ray.
+/// Outcomes are stored in arrival order. `Joint` is the joint transport that may be combined with
+/// camera paths (path/joint_transport.h).
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Joint>
 void shade_batch(Wave& wave, const WaveContext& context, const ShadeSettings& settings,
                  uint32_t depth, size_t begin, size_t end) {

@@ -7,7 +7,7 @@
 
 namespace wavecomb {
 
-/// Copies the first fields of the rows of all queued slots into the columns of a queue.
+/// For all queued slots, copies the first fields of the slot's row into the columns of a queue.
 template <template <typename> class Head, template <typename> class Row, typename F, typename Queue,
           size_t C>
 void fetch(const Queue& q, const float* rows, float* const (&columns)[C]) {
@@ -97,8 +97,8 @@ void occlude(Wave& wave, const WaveContext& context, uint32_t depth, bool uses_l
 }
 
 /// Adds the contributions of unblocked shadow rays to the radiance of their paths, multiplied by
-/// the transmittance of volumes and media. A slot has at most one shadow ray, so the order of the
-/// queue does not matter.
+/// the transmittance of volumes and media. Each slot has at most one shadow ray, so the order of
+/// the queue does not matter.
 template <typename F, typename Media>
 void shadow(Wave& wave, const WaveContext& context, uint32_t depth,
             [[maybe_unused]] const Media& media) {
