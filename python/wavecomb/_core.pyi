@@ -579,12 +579,12 @@ class SceneBuilder:
         # ---- camera_table(): tools/update_stub ----
         # Lens radius in scene units; 0 gives a pinhole camera.
         lens_radius: float = 0,
-        # Distance of the focal plane along -z in scene units; must be above 0 if the lens radius
-        # is.
+        # Distance of the focal plane along -z in scene units; must be above 0 if the lens radius is
+        # above 0.
         focus_distance: float = 1,
-        # Near clipping distance in scene units, along -z, or radial for a latlong camera.
+        # Near clipping distance in scene units: along -z, or from the centre of a latlong camera.
         near_clip: float = 0,
-        # Far clipping distance in scene units, along -z, or radial for a latlong camera.
+        # Far clipping distance in scene units: along -z, or from the centre of a latlong camera.
         far_clip: float = 1e30,
         # Visible region (x0, x1, y0, y1) of a camera: on the plane z = -1 for perspective, in scene
         # units for orthographic, in radians of longitude and latitude for latlong.
@@ -624,8 +624,8 @@ class SceneBuilder:
         lens_p1: float = 0,
         # Second coefficient of the tangential lens distortion.
         lens_p2: float = 0,
-        # Lens distortion as a map of n x n nodes, two per row of four numbers; a node is a position
-        # in fractions of the undistorted image's width and height.
+        # Lens distortion map of n x n nodes, two in each row of four numbers; a node is a position
+        # in the undistorted image, in fractions of its width and height.
         lens_map: Sequence[Sequence[float]] = [],
         # Image edge at which the exposure of a rolling shutter begins.
         rolling_shutter: Literal["off", "top", "bottom", "left", "right"] = "off",
@@ -691,12 +691,12 @@ class Settings:
     @filter_width.setter
     def filter_width(self, value: float | None) -> None: ...
     clamp_indirect: float
-    """Maximum luminance of an indirect contribution, which reduces fireflies but darkens the image.
-    Default: off. 0: off."""
+    """Clamps indirect contributions to this luminance, which reduces fireflies but darkens the
+    image. Default: off. 0: off."""
     fresnel: Literal["exact", "schlick"]
     """Formula for the reflectance of dielectrics. Default: exact."""
     texture_filter: Literal["auto", "whole"]
-    """Where textures are fully filtered. Default: auto."""
+    """Hits that use full texture filtering. Default: auto."""
     cosine_sampling: bool
     """Samples non-specular bounces with a cosine-weighted density instead of the BSDF, for
     comparisons. Default: False."""
@@ -717,7 +717,8 @@ class Settings:
     roulette: Literal["auto", "off", "throughput", "cost-aware", "efficient"]
     """Russian roulette, which terminates paths early without bias. Default: auto."""
     quality: Literal["auto", "plain"]
-    """Whether short pilot renders decide about path guiding and light paths. Default: auto."""
+    """Whether short pilot renders decide if path guiding and light paths are used. Default:
+    auto."""
     transport: Literal["path", "light", "auto", "bdpt"]
     """Whether paths start at the camera only or also at the lights. Default: auto."""
     light_aim: Literal["off", "on"]
@@ -726,20 +727,21 @@ class Settings:
     """How light paths add light to the pixels around a point that the camera sees. Default:
     auto."""
     merge_radius: float
-    """Radius in pixels within which light paths merge at points seen in mirrors or through glass,
-    which blurs these caustics. Default: never. 0: never."""
+    """Radius in pixels of path merging, which finds caustics seen in mirrors or through glass, but
+    blurs them. Default: never. 0: never."""
     firefly: Literal["keep", "reweight"]
     """Treatment of samples that are much brighter than their neighbours. Default: keep."""
     roulette_depth: int
-    """First vertex of a path at which Russian roulette may terminate it. Default: 2."""
+    """First path vertex at which Russian roulette may terminate a path. Default: 2."""
     light_selection: Literal["auto", "tree", "power"]
-    """How a light to sample is chosen at a shading point. Default: auto."""
+    """Method that chooses which light to sample at a shading point. Default: auto."""
     light_weights: Literal["calibrated", "power"]
-    """Weight of each light in the choice of a light to sample. Default: calibrated."""
+    """Weights of the lights in light selection. Default: calibrated."""
     equiangular: Literal["off", "on"]
     """How scattering distances in homogeneous volumes are sampled. Default: off."""
     guiding: Literal["auto", "on", "off"]
-    """Path guiding, which also samples bounces by learned incident light. Default: auto."""
+    """Path guiding, which samples some bounce directions by learned incident light. Default:
+    auto."""
     learn_memory: int
     """Memory limit of the path guiding field in MB. Default: 64."""
     adaptive: float
@@ -747,9 +749,10 @@ class Settings:
     noise: float
     """Renders until the image's mean relative error is below this value. Default: off. 0: off."""
     min_spp: int
-    """Samples per pixel before adaptive sampling first estimates the error. Default: 16."""
+    """Samples per pixel before adaptive sampling estimates errors for the first time. Default:
+    16."""
     spp: int
-    """Number of samples per pixel, or their maximum with adaptive sampling. Default: 64."""
+    """Number of samples per pixel, or the maximum with adaptive sampling. Default: 64."""
     allocate: Literal["even", "error", "efficiency"]
     """How samples are distributed over pixels. Default: even."""
     time_limit: float
@@ -765,12 +768,12 @@ class Settings:
     shadow_order: Literal["slot", "morton", "morton-octant", "direction", "auto"]
     """The order in which shadow rays are traced. Default: auto."""
     lanes: int
-    """Number of SIMD lanes, that is, of hits that are shaded at once. Default: auto. 0: auto."""
+    """Number of SIMD lanes, each of which shades one hit. Default: auto. 0: auto."""
     wave_size: int
-    """Number of paths in a wave, which a thread processes together. Default: automatic. 0:
+    """Number of paths in a wave, which one thread processes together. Default: automatic. 0:
     automatic."""
     materialize: Literal["auto", "on", "off"]
-    """Whether the inputs of shading are copied into shading order. Default: auto."""
+    """Whether shading inputs are copied into the order of shading. Default: auto."""
     traversal: Literal["packets", "single"]
     """Whether Embree traces rays in packets or one by one, which does not change the image.
     Default: packets."""

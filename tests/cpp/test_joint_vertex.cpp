@@ -2,6 +2,7 @@
 // JointVertex evaluates the BSDF in reverse only where the result depends on it.
 #include <gtest/gtest.h>
 
+#include "wavecomb/core/settings.h"
 #include "wavecomb/light_paths/join.h"
 
 namespace wavecomb {

@@ -7,6 +7,7 @@
 
 #include "parts.h"
 #include "program_cases.h"
+#include "wavecomb/core/settings.h"
 #include "wavecomb/path/steps/bounce_sampling.h"
 
 namespace wavecomb {

@@ -11,6 +11,7 @@
 #include "wavecomb/accel/embree_hierarchy.h"
 #include "wavecomb/accel/triangle_list.h"
 #include "wavecomb/geometry/curve/bvh_nodes.h"
+#include "wavecomb/scene/scene.h"
 
 namespace wavecomb {
 namespace {

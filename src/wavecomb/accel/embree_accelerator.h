@@ -5,11 +5,13 @@
 #include <cstdint>
 #include <memory>
 
-#include "wavecomb/scene/scene.h"
+#include "wavecomb/scene/scene_view.h"
 
 struct RTCSceneTy;  // Embree's scene type
 
 namespace wavecomb {
+
+class Scene;
 
 /// Rays to trace, as one array per component. Directions are unit vectors, and rays start at
 /// distance 0.

@@ -10,6 +10,7 @@
 #include "wavecomb/accel/embree_accelerator.h"
 #include "wavecomb/accel/presence.h"
 #include "wavecomb/geometry/curve/ray.h"
+#include "wavecomb/geometry/mesh/bounds.h"
 
 namespace wavecomb {
 

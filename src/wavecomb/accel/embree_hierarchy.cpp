@@ -13,6 +13,7 @@
 #include "wavecomb/accel/presence.h"
 #include "wavecomb/core/error.h"
 #include "wavecomb/core/task_order.h"
+#include "wavecomb/scene/scene.h"
 
 namespace wavecomb {
 

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "wavecomb/light/description/motion.h"
+#include "wavecomb/scene/scene.h"
 
 namespace wavecomb {
 namespace {

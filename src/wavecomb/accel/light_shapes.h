@@ -5,9 +5,11 @@
 #include <vector>
 
 #include "wavecomb/light/description/kind_info.h"
-#include "wavecomb/scene/scene.h"
+#include "wavecomb/scene/scene_view.h"
 
 namespace wavecomb {
+
+class Scene;
 
 /// Geometry of a light, without its emission.
 struct LightGeometry {

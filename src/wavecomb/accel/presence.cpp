@@ -8,6 +8,7 @@
 #include "wavecomb/geometry/hit/hit_material.h"
 #include "wavecomb/geometry/hit/uv.h"
 #include "wavecomb/material/inputs/presence.h"
+#include "wavecomb/scene/scene.h"
 
 namespace wavecomb {
 namespace {

@@ -6,9 +6,11 @@
 #include <vector>
 
 #include "wavecomb/accel/embree_accelerator.h"
-#include "wavecomb/scene/scene.h"
+#include "wavecomb/scene/scene_view.h"
 
 namespace wavecomb {
+
+class Scene;
 
 /// Point on a primitive that the ray of a path may hit.
 struct PresenceQuery {

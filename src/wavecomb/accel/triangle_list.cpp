@@ -11,6 +11,7 @@
 #include "wavecomb/accel/presence.h"
 #include "wavecomb/core/frame.h"
 #include "wavecomb/core/lanes/lanes.h"
+#include "wavecomb/scene/scene.h"
 
 namespace wavecomb {
 namespace {

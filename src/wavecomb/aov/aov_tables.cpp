@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "wavecomb/core/error.h"
+#include "wavecomb/core/settings.h"
 #include "wavecomb/film/layer_ids.h"
 #include "wavecomb/light/kinds/kinds.h"
 #include "wavecomb/light/sampling/light_sample.h"

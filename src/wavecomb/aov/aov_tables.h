@@ -10,10 +10,12 @@
 #include "wavecomb/core/lanes/lanes.h"
 #include "wavecomb/core/path_expressions/backward_automaton.h"
 #include "wavecomb/core/path_expressions/path_expression.h"
-#include "wavecomb/core/settings.h"
+#include "wavecomb/core/settings_choices.h"
 #include "wavecomb/film/aov_film.h"
 
 namespace wavecomb {
+
+struct Settings;
 
 class Scene;
 

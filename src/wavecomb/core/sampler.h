@@ -10,7 +10,7 @@
 
 #include "wavecomb/core/encoding/hash.h"
 #include "wavecomb/core/rows/fields.h"
-#include "wavecomb/core/settings.h"
+#include "wavecomb/core/settings_choices.h"
 
 namespace wavecomb {
 

@@ -25,7 +25,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "wavecomb/core/settings.h"
+#include "wavecomb/core/settings_choices.h"
 
 namespace wavecomb {
 

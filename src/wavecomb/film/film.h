@@ -9,7 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "wavecomb/core/settings.h"
+#include "wavecomb/core/aov.h"
+#include "wavecomb/core/settings_choices.h"
 #include "wavecomb/film/aov_film.h"
 #include "wavecomb/film/cascades.h"
 #include "wavecomb/film/error/error_sums.h"

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "wavecomb/core/settings.h"
+#include "wavecomb/core/settings_choices.h"
 
 namespace wavecomb {
 

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "wavecomb/core/error.h"
+#include "wavecomb/core/settings.h"
 
 namespace wavecomb {
 namespace {

@@ -6,10 +6,12 @@
 #include <span>
 #include <vector>
 
-#include "wavecomb/core/settings.h"
+#include "wavecomb/core/settings_choices.h"
 #include "wavecomb/guiding/field/field_view.h"
 
 namespace wavecomb {
+
+struct Settings;
 
 /// Brightness of the whole image in at most 16 x 16 tiles, each with at least 64 paths. Sums are
 /// integers, so the result does not depend on the order of the paths.

@@ -2,11 +2,13 @@
 /// Data of light paths that all waves of a render read.
 #pragma once
 
-#include "wavecomb/core/settings.h"
+#include "wavecomb/core/settings_choices.h"
 #include "wavecomb/film/splats/light_splat_filter.h"
 #include "wavecomb/path/camera/camera_ray.h"
 
 namespace wavecomb {
+
+struct Settings;
 
 class AimSamples;
 class MergeGrid;
@@ -19,13 +21,7 @@ struct LightPathContext {
   /// `paths_per_sample` is the number of light paths per camera path, averaged over the image.
   /// `grid` holds the points with which light paths are merged, or is null.
   LightPathContext(const Settings& settings, const LightSplatFilter& filter, float paths_per_sample,
-                   const MergeGrid* grid)
-      : filter(&filter),
-        grid(grid),
-        connects(settings.connects()),
-        share(1.f / (static_cast<float>(settings.width) * static_cast<float>(settings.height) *
-                     paths_per_sample)),
-        merge_scale(grid ? settings.merge_radius / kConeShare : 0.f) {}
+                   const MergeGrid* grid);
 
   /// Filter of light splats; null without light paths.
   const LightSplatFilter* filter = nullptr;

@@ -6,9 +6,21 @@
 
 #include "wavecomb/accel/light_shapes.h"
 #include "wavecomb/core/error.h"
+#include "wavecomb/core/settings.h"
+#include "wavecomb/light_paths/context.h"
 #include "wavecomb/path/camera/camera_ray.h"
+#include "wavecomb/scene/scene.h"
 
 namespace wavecomb {
+
+LightPathContext::LightPathContext(const Settings& settings, const LightSplatFilter& filter,
+                                   float paths_per_sample, const MergeGrid* grid)
+    : filter(&filter),
+      grid(grid),
+      connects(settings.connects()),
+      share(1.f / (static_cast<float>(settings.width) * static_cast<float>(settings.height) *
+                   paths_per_sample)),
+      merge_scale(grid ? settings.merge_radius / kConeShare : 0.f) {}
 namespace {
 
 /// Factor, slightly above 1, by which the bounding sphere of all surfaces is enlarged.

@@ -11,10 +11,11 @@
 #include "wavecomb/core/encoding/fixed_point.h"
 #include "wavecomb/core/settings.h"
 #include "wavecomb/film/splats/light_splat_filter.h"
-#include "wavecomb/scene/scene.h"
+#include "wavecomb/scene/scene_view.h"
 
 namespace wavecomb {
 
+class Scene;
 struct CameraSetup;
 
 /// Number of light paths per camera path, averaged over the image: 2^exponent.

@@ -5,7 +5,6 @@
 
 #include "wavecomb/core/rows/fields.h"
 #include "wavecomb/core/sampler.h"
-#include "wavecomb/core/settings.h"
 #include "wavecomb/core/vec.h"
 #include "wavecomb/geometry/hit/hit_material.h"
 #include "wavecomb/geometry/hit/surface.h"
@@ -13,40 +12,9 @@
 #include "wavecomb/light/sampling/light_sample.h"
 #include "wavecomb/path/features.h"
 #include "wavecomb/path/path_pool.h"
+#include "wavecomb/path/shade_settings.h"
 
 namespace wavecomb {
-
-/// Render settings that shading reads.
-struct ShadeSettings {
-  SamplerKind sampler;
-  uint32_t max_depth;
-  bool roulette;    ///< roulette by throughput, after a vertex
-  bool cost_aware;  ///< roulette by throughput and cost, before a vertex
-  bool efficient;   ///< roulette by learned expected contribution, after a vertex
-  uint32_t roulette_depth;
-  float clamp_indirect;  ///< largest luminance of indirect contributions; 0 disables clamping
-  bool schlick_fresnel;
-  bool cosine_sampling;
-  bool filters_all_lookups;
-  bool shows_environment;  ///< whether camera rays show domes and distant lights
-
-  explicit ShadeSettings(const Settings& s)
-      : sampler(s.sampler),
-        max_depth(s.max_depth),
-        roulette(s.roulette != RouletteKind::kOff && s.roulette != RouletteKind::kCostAware),
-        cost_aware(s.roulette == RouletteKind::kCostAware),
-        efficient(s.roulette == RouletteKind::kEfficient || s.roulette == RouletteKind::kAuto),
-        roulette_depth(s.roulette_depth),
-        clamp_indirect(s.clamp_indirect),
-        schlick_fresnel(s.schlick_fresnel),
-        cosine_sampling(s.cosine_sampling),
-        filters_all_lookups(s.texture_filter == TextureFilter::kWhole),
-        shows_environment(!s.alpha) {}
-
-  /// Returns whether a path that leaves the scene after `depth` vertices receives the light of the
-  /// environment.
-  bool adds_environment(uint32_t depth) const { return shows_environment || depth > 0; }
-};
 
 /// State of a path at a vertex. `dir` is the direction of the ray that hit the vertex. The ray cone
 /// is given at the hit point.

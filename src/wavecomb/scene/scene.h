@@ -16,41 +16,10 @@
 #include "wavecomb/medium/description/volume.h"
 #include "wavecomb/scene/camera/camera.h"
 #include "wavecomb/scene/scene_parts.h"
+#include "wavecomb/scene/scene_view.h"
 #include "wavecomb/scene/visibility.h"
 
 namespace wavecomb {
-
-/// Device view of a scene. The pointers are valid as long as the Scene exists.
-struct SceneView {
-  const MeshRecord* meshes = nullptr;
-  const InstanceRecord* instances = nullptr;
-  const TangentRecord* tangents = nullptr;  ///< indexed by mesh; null if no mesh has tangents
-  /// mesh id of a geometry of an instance, at index `instance.geometry` + geometry id
-  const uint32_t* geometry_mesh = nullptr;
-  /// Light index of the first triangle of an emissive mesh instance, stored at index
-  /// `instance.emissive` + geometry id.
-  const uint32_t* emissive_lights = nullptr;
-  /// Index of the light record of a mesh light, or kNoLight for other mesh instances. Indexed like
-  /// `emissive_lights`. Null if the scene has no mesh lights.
-  const uint32_t* mesh_lights = nullptr;
-  /// RayVisibility bits of each mesh instance, indexed like `emissive_lights`. Null if every object
-  /// is visible to all rays.
-  const uint32_t* visibility = nullptr;
-  const uint32_t* material_program = nullptr;
-  const uint32_t* material_variant = nullptr;  ///< see variants.h
-  MaterialView materials;
-  LightView lights;
-  MotionView motion;
-  VolumeView volumes;
-  SubsurfaceView subsurface;
-  MeshMediaView nested_media;
-  float scale = 1;  ///< radius of the bounding sphere
-  bool has_presence = false;
-  bool has_emissive_meshes = false;
-  bool has_curves = false;  ///< whether some mesh consists of curves, points or splats
-  bool has_motion = false;  ///< whether some mesh, instance or light moves while the shutter is
-                            ///< open
-};
 
 /// Memory used by the arrays of a scene, in bytes.
 struct SceneBytes {

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "wavecomb/geometry/mesh/bounds.h"
 #include "wavecomb/geometry/mesh/mesh.h"
 #include "wavecomb/geometry/mesh/motion.h"
 #include "wavecomb/light/description/light.h"
@@ -22,37 +23,11 @@
 #include "wavecomb/medium/description/subsurface.h"
 #include "wavecomb/medium/description/volume.h"
 #include "wavecomb/scene/names.h"
+#include "wavecomb/scene/scene_view.h"
 #include "wavecomb/scene/visibility.h"
 #include "wavecomb/texture/texture.h"
 
 namespace wavecomb {
-
-/// Packed instance; a record fills one cache line. Instance 0 is the world itself, with the
-/// identity transform.
-struct alignas(64) InstanceRecord {
-  float to_world[12];  ///< 3 x 4 matrix [A | translation], row by row
-  /// Index of the first entry of the instance's group in SceneView::geometry_mesh.
-  uint32_t geometry;
-  uint32_t material;  ///< material of the group's meshes whose material is kInheritMaterial
-  /// Index of the instance's first entry in SceneView::emissive_lights, if any mesh emits.
-  uint32_t emissive;
-  float side;  ///< sign of det A; -1 for a mirroring transform
-};
-static_assert(sizeof(InstanceRecord) == 64);
-
-struct Bounds {
-  Vec3<float> lo{1e30f, 1e30f, 1e30f}, hi{-1e30f, -1e30f, -1e30f};
-  bool empty() const { return lo.x > hi.x; }
-  void add(const Vec3<float>& p) {
-    lo = {p.x < lo.x ? p.x : lo.x, p.y < lo.y ? p.y : lo.y, p.z < lo.z ? p.z : lo.z};
-    hi = {p.x > hi.x ? p.x : hi.x, p.y > hi.y ? p.y : hi.y, p.z > hi.z ? p.z : hi.z};
-  }
-  void add(const Bounds& b) {
-    if (b.empty()) return;
-    add(b.lo);
-    add(b.hi);
-  }
-};
 
 /// A group of meshes, built once for traversal and instanced any number of times.
 struct Group {

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "wavecomb/core/settings.h"
+#include "wavecomb/core/settings_choices.h"
 
 namespace wavecomb {
 

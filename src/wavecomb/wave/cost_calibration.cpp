@@ -3,6 +3,9 @@
 
 #include <algorithm>
 
+#include "wavecomb/core/settings.h"
+#include "wavecomb/scene/scene.h"
+
 namespace wavecomb {
 namespace {
 

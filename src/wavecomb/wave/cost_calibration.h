@@ -5,10 +5,12 @@
 
 #include <vector>
 
-#include "wavecomb/scene/scene.h"
+#include "wavecomb/scene/scene_view.h"
 #include "wavecomb/schedule/policy.h"
 
 namespace wavecomb {
+
+class Scene;
 
 /// Ids of the triangle of a synthetic hit.
 struct CalibrationHit {

@@ -10,7 +10,6 @@
 #include "wavecomb/accel/embree_accelerator.h"
 #include "wavecomb/aov/aov_tables.h"
 #include "wavecomb/aov/path_events.h"
-#include "wavecomb/core/settings.h"
 #include "wavecomb/film/film.h"
 #include "wavecomb/medium/nested/buffers.h"
 #include "wavecomb/path/camera/camera_ray.h"
@@ -33,6 +32,8 @@
 #include "wavecomb/wave/ray_recorder.h"
 
 namespace wavecomb {
+
+struct Settings;
 
 /// Data that all waves of a render read.
 struct WaveContext {
@@ -76,9 +77,7 @@ struct WaveContext {
   bool uses_pixel_importance() const { return guide && guide->tiles; }
   /// Returns the number of path vertices to store for each path.
   uint32_t stored_vertices() const { return histories ? histories->most() : 0; }
-  bool orders_rays() const {
-    return settings->ray_order != RayOrder::kSlot || settings->shadow_order != RayOrder::kSlot;
-  }
+  bool orders_rays() const;
 };
 
 /// Buffers of one worker.

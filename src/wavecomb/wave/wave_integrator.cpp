@@ -1,7 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "wavecomb/wave/wave_integrator.h"
+#include "wavecomb/core/settings.h"
 
 namespace wavecomb {
+
+bool WaveContext::orders_rays() const {
+  return settings->ray_order != RayOrder::kSlot || settings->shadow_order != RayOrder::kSlot;
+}
 
 WaveIntegrator::WaveIntegrator(const WaveContext& context, RunWave run_wave, uint32_t lanes,
                                uint32_t threads, uint32_t wave_size)

@@ -9,8 +9,9 @@
 #include <cstdint>
 
 #include "wavecomb/geometry/curve/ray.h"
+#include "wavecomb/geometry/mesh/bounds.h"
 #include "wavecomb/geometry/mesh/mesh.h"
-#include "wavecomb/scene/scene.h"
+#include "wavecomb/scene/scene_view.h"
 
 namespace wavecomb {
 

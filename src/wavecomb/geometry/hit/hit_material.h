@@ -3,7 +3,7 @@
 #pragma once
 
 #include "wavecomb/core/rows/rows.h"
-#include "wavecomb/scene/scene.h"
+#include "wavecomb/scene/scene_view.h"
 
 namespace wavecomb {
 

@@ -11,7 +11,7 @@
 #include "wavecomb/core/rows/rows.h"
 #include "wavecomb/core/sampler.h"
 #include "wavecomb/core/vec.h"
-#include "wavecomb/scene/scene.h"
+#include "wavecomb/scene/scene_view.h"
 
 namespace wavecomb {
 

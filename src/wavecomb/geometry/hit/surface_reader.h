@@ -7,7 +7,7 @@
 #include "wavecomb/core/rows/fields.h"
 #include "wavecomb/core/rows/rows.h"
 #include "wavecomb/geometry/hit/motion.h"
-#include "wavecomb/scene/scene.h"
+#include "wavecomb/scene/scene_view.h"
 
 namespace wavecomb {
 

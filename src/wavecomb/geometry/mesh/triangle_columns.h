@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "wavecomb/core/vec.h"
 #include "wavecomb/geometry/mesh/mesh.h"
 
 namespace wavecomb {

@@ -8,11 +8,12 @@
 #include <span>
 #include <vector>
 
+#include "wavecomb/geometry/mesh/bounds.h"
 #include "wavecomb/light/description/light_builder.h"
 #include "wavecomb/light/description/light_records.h"
 #include "wavecomb/light/description/light_table.h"
 #include "wavecomb/light/tree/light_cluster.h"
-#include "wavecomb/scene/scene_parts.h"
+#include "wavecomb/texture/texture.h"
 
 namespace wavecomb {
 

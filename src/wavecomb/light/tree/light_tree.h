@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "wavecomb/core/settings.h"
+#include "wavecomb/core/settings_choices.h"
 #include "wavecomb/light/description/light_records.h"
 
 namespace wavecomb {

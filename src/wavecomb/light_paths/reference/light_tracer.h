@@ -2,7 +2,7 @@
 /// Light paths of the reference integrator, traced one after the other in scalar code.
 #pragma once
 
-#include "wavecomb/light_paths/light_path.h"
+#include "wavecomb/light_paths/light_path_start.h"
 #include "wavecomb/light_paths/stages/light_kernels.h"
 #include "wavecomb/light_paths/stages/light_splat.h"
 #include "wavecomb/path/steps/survive.h"

@@ -2,7 +2,7 @@
 /// Wave stage 1 of light paths: starts a light path in every slot.
 #pragma once
 
-#include "wavecomb/light_paths/light_path.h"
+#include "wavecomb/light_paths/light_path_start.h"
 #include "wavecomb/wave/stages/order_rays.h"
 #include "wavecomb/wave/wave.h"
 

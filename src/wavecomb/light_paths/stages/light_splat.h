@@ -4,7 +4,7 @@
 #pragma once
 
 #include "wavecomb/light_paths/aiming/aim_samples.h"
-#include "wavecomb/light_paths/light_path.h"
+#include "wavecomb/light_paths/light_path_start.h"
 #include "wavecomb/wave/stages/trace.h"
 
 namespace wavecomb {

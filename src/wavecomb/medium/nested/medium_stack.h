@@ -7,7 +7,7 @@
 
 #include "wavecomb/core/math.h"
 #include "wavecomb/path/path_pool.h"
-#include "wavecomb/scene/scene.h"
+#include "wavecomb/scene/scene_view.h"
 
 namespace wavecomb {
 

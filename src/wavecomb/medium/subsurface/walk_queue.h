@@ -6,7 +6,7 @@
 #include "wavecomb/accel/embree_accelerator.h"
 #include "wavecomb/core/rows/soa.h"
 #include "wavecomb/medium/subsurface/random_walk.h"
-#include "wavecomb/scene/scene.h"
+#include "wavecomb/scene/scene_view.h"
 
 namespace wavecomb {
 

@@ -15,6 +15,7 @@
 #include "wavecomb/core/denormals.h"
 #include "wavecomb/core/error.h"
 #include "wavecomb/core/task_order.h"
+#include "wavecomb/scene/scene.h"
 #include "wavecomb/schedule/ray_queue.h"
 
 namespace wavecomb {

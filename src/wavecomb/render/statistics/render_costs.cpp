@@ -7,6 +7,8 @@
 
 #include "wavecomb/core/clock.h"
 #include "wavecomb/core/denormals.h"
+#include "wavecomb/core/settings.h"
+#include "wavecomb/scene/scene.h"
 
 namespace wavecomb {
 namespace {

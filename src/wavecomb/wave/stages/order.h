@@ -5,6 +5,7 @@
 #include "wavecomb/core/encoding/morton.h"
 #include "wavecomb/core/math.h"
 #include "wavecomb/core/rows/fields.h"
+#include "wavecomb/core/settings.h"
 #include "wavecomb/geometry/hit/uv.h"
 #include "wavecomb/material/description/variants.h"
 #include "wavecomb/wave/wave.h"

@@ -2,6 +2,7 @@
 /// Wave stage 2 finds the closest hits of rays, and wave stage 4 tests shadow rays.
 #pragma once
 
+#include "wavecomb/core/settings.h"
 #include "wavecomb/path/media.h"
 #include "wavecomb/wave/wave.h"
 
