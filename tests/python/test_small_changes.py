@@ -267,13 +267,17 @@ OF_LIGHT_PATHS: Change = {
         '      number<&S::seed>("seed"',
     ),
     f"{CORE}/light_paths/context.h": (
-        "        connects(settings.connects()),\n",
-        "        connects(settings.connects()),\n"
-        "        longest2(settings.longest_connection > 0\n"
-        "                     ? settings.longest_connection * settings.longest_connection\n"
-        "                     : kInfinity),\n",
         "  float share = 1;",
-        "  float longest2 = kInfinity;\n  float share = 1;",
+        "  float longest2 = std::numeric_limits<float>::infinity();\n  float share = 1;",
+        "#pragma once\n",
+        "#pragma once\n\n#include <limits>\n",
+    ),
+    f"{CORE}/light_paths/setup.cpp": (
+        "      connects(settings.connects()),\n",
+        "      connects(settings.connects()),\n"
+        "      longest2(settings.longest_connection > 0\n"
+        "                   ? settings.longest_connection * settings.longest_connection\n"
+        "                   : std::numeric_limits<float>::infinity()),\n",
     ),
     f"{CORE}/light_paths/coupling.h": (
         "      if (context_.connects) [[unlikely]]\n        offer_connection(c, joint_, offer_);\n",
@@ -399,7 +403,7 @@ def test_a_parameter_of_light_paths(tmp_path: Path, compiler: list[str]) -> None
     applied(tmp_path, OF_LIGHT_PATHS)
     done = compiled(tmp_path, compiler, text=USES_TRANSPORT.replace("CLASS", "LightPaths"))
     assert done.returncode == 0, done.stderr
-    done = compiled(tmp_path, compiler, "settings_table.cpp")
+    done = compiled(tmp_path, compiler, "settings_table.cpp", "setup.cpp")
     assert done.returncode == 0, done.stderr
 
 

@@ -21,6 +21,7 @@ LightPathContext::LightPathContext(const Settings& settings, const LightSplatFil
       share(1.f / (static_cast<float>(settings.width) * static_cast<float>(settings.height) *
                    paths_per_sample)),
       merge_scale(grid ? settings.merge_radius / kConeShare : 0.f) {}
+
 namespace {
 
 /// Factor, slightly above 1, by which the bounding sphere of all surfaces is enlarged.
