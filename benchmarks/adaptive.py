@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compare the adaptive policy with the best fixed policy, and measure the cost of timing records.
+"""Compare the adaptive policy with the best fixed policy, and measure the overhead of cost timers.
 
     .venv/bin/python benchmarks/adaptive.py out/mixed.usdc out/dragon.usdc out/cornell.usda
 
 Renders each stage with every policy, in rounds of shuffled order, in one process. Prints medians of
-the render time, the ratio of adaptive to the best fixed policy, and the ratio of shading time with
-cost measurement to shading time without.
+the render time, of the ratio of the adaptive policy's time to the best fixed policy's, and of the
+ratio of shading times with and without cost measurement.
 """
 
 from __future__ import annotations

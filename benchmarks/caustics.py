@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compare the efficiency of light paths (``--transport light`` and ``auto``) with ``path``.
+"""Compare the efficiency of ``--transport light`` and ``auto`` (light paths) with ``path``.
 
     .venv/bin/python benchmarks/caustics.py caustics pool lens prism landscape mixed dragon
 
@@ -9,11 +9,11 @@ merged within half a pixel. Short renders determine how many samples each mode t
 ``merged`` have ``--merge-radius 1``, and ``unaimed`` is ``light`` with ``--light-aim off``.
 
 Efficiency is 1 / (relMSE x seconds). relMSE is the mean of (image - reference 1) x (image -
-reference 2) / (m^2 + 0.01 of its mean^2), with m the mean of the references: independent noise of
-the references adds nothing on average. Seconds are wall time including training and pilot renders
-but not loading. Results are given for the whole image and for the caustics: pixels where light
-paths contribute more than half of the references. Trimmed errors leave out the 0.1 % of the pixels
-with the largest errors.
+reference 2) / (m^2 + 0.01 L^2), where m is the mean of both references and L the mean luminance of
+m. The noise of the references is independent, so it does not change the expected relMSE. Seconds
+are wall time, which includes training and pilot renders but not loading. Results are given for the
+whole image and for the caustics: pixels where light paths contribute more than half of the
+references. Trimmed errors leave out the 0.1 % of the pixels with the largest errors.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ class Stage:
         return picture, time.perf_counter() - begin
 
     def samples(self, way: str) -> int:
-        """Estimate from short renders how many samples mode `way` takes in ``--seconds``."""
+        """Estimate from short renders how many samples the mode `way` takes in ``--seconds``."""
         spp, most = 4, self.options.reference // 4
         done, before = 0, 0.0
         while True:

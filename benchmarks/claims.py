@@ -5,23 +5,24 @@
     .venv/bin/python benchmarks/claims.py --only lanes threads  # a part of it
     .venv/bin/python benchmarks/claims.py --quick               # check that it runs
 
-- traversal: fraction of the render that the trace and shadow phases take, for each policy. The
-  fraction is given of all thread time, and of the sum of all phases, which excludes idle threads.
+- traversal: fraction of time that the trace and shadow phases take, for each policy. One fraction
+  is relative to all thread time, another to the sum of all phases, which excludes idle threads.
 - lanes: time of shading plus ordering with the maximum number of SIMD lanes, for each policy,
   compared with shading in arrival order on 1 lane and on the maximum number of lanes.
 - reference: the wavefront at 1 lane and with default settings, compared with the scalar depth-first
   reference integrator.
 - threads: speedup of --threads threads over one thread.
-- linear: time by number of samples and pixels. A line t = a + b n is fitted with equal weight for
-  relative errors. Results are the largest deviation from the line and the constant cost of a call.
+- linear: render time as a function of the number of samples or pixels. A line t = a + b n is fitted
+  by least squares of the relative errors. Results are the largest deviation from the line and the
+  constant cost of a call.
 - waves: the default wave size compared with the best of 256 to 2^20.
 
 A round renders every configuration of a stage once, in shuffled order; configurations that several
 measurements share are rendered once. Ratios are taken within a round. Results are medians over
 rounds with a bootstrap interval of 95 %. "best" is the policy or wave size with the lowest median.
 Times exclude loading and scene construction. All images of one size and sample count must be
-bitwise equal, or the benchmark fails. The ratio to Embree alone is measured by benchmarks/limit.py,
-and benchmarks/peers compares Wavecomb with other renderers.
+bitwise equal, or the benchmark fails. benchmarks/limit.py compares Wavecomb with Embree alone, and
+benchmarks/peers compares it with other renderers.
 """
 
 from __future__ import annotations
@@ -52,10 +53,10 @@ from wavecomb import _core
 
 WIDEST = max(_core.lane_widths())
 WAVE_SIZES = tuple(4**k for k in range(4, 11))
-"""Compared numbers of paths in a wave, from 256 to 2^20."""
+"""Wave sizes to compare, in paths: 256 to 2^20."""
 SPP_FACTORS = (0.5, 1, 2, 4)
 EDGE_FACTORS = (0.5, 0.7071, 1, 1.4142)
-"""Factors of the image width; each step doubles the number of pixels."""
+"""Factors by which the image width is multiplied; each step doubles the number of pixels."""
 
 Choice = dict[str, Any]
 Figures = dict[str, Any]
@@ -106,7 +107,7 @@ def traversal_choices(args: argparse.Namespace) -> list[Choice]:
 
 
 def traversal(stage: Stage) -> Figures:
-    """Return the fraction of render time that the trace and shadow phases take, by policy."""
+    """Return the fraction of render time that the trace and shadow phases take, for each policy."""
     choices = traversal_choices(stage.args)
     shares = {}
     for choice in choices:
@@ -124,7 +125,7 @@ def lanes_choices(args: argparse.Namespace) -> list[Choice]:
 
 
 def lanes(stage: Stage) -> Figures:
-    """Return the speedup of shading by the widest SIMD lanes and by ordering."""
+    """Return the speedup of shading due to the widest SIMD lanes and due to ordering."""
     best = stage.quickest(traversal_choices(stage.args))
     shading = ("shade_s", "order_s")
     scalar = stage.times({"policy": "none", "lanes": 1}, *shading)

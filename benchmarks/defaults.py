@@ -4,14 +4,14 @@
     .venv/bin/python benchmarks/defaults.py @tuning --ways plain default guided --spp 64
     .venv/bin/python benchmarks/defaults.py room caustics --ways plain default light --reference 0
 
-Stages are names of STAGES, ``@tuning`` and ``@validation``, or files. Each stage is rendered with
-several seeds in each mode of ``--ways``, with one thread; the first mode is the baseline. Errors
-are squared relative errors (x - r)^2 / (r^2 + 0.01) against a reference, the mean of four renders
-of ``--reference`` samples in the best mode for the stage, kept in ``out/defaults``. With
-``--reference 0``, r is the mean of all images of the stage, which needs no further renders but
-understates errors by a few per cent. Error percentiles are taken over pixels. Cost is user CPU time
-of the whole render, pilots included, so other work on the machine has little effect. Efficiency is
-1 / (error x cost).
+Stages are given by their names in STAGES, as ``@tuning`` or ``@validation``, or as files. Each
+stage is rendered with several seeds in each mode of ``--ways``, with one thread; the first mode is
+the baseline. Errors are squared relative errors (x - r)^2 / (r^2 + 0.01) against a reference r. The
+reference is the mean of four renders of ``--reference`` samples in the best mode for the stage, and
+is cached in ``out/defaults``. With ``--reference 0``, r is the mean of all images of the stage,
+which needs no further renders but understates errors by a few per cent. Error percentiles are taken
+over pixels. Cost is user CPU time of the whole render, pilots included, so other work on the
+machine has little effect. Efficiency is 1 / (error x cost).
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ ASSETS = Path(__file__).resolve().parents[2] / "shared" / "assets" / "usd"
 
 @dataclass(frozen=True)
 class Stage:
-    """A stage: a generator with options, or a file of the asset folder.
+    """A stage: a generator with options, or a file in the asset folder.
 
     Attributes:
         scene: Name of the generator, or path of the file below the asset folder.
@@ -101,7 +101,7 @@ def load(name: str, folder: Path) -> Any:
 
 
 def render(scene: Any, way: str, spp: int, seed: int, size: tuple[int, int]) -> tuple[Any, float]:
-    """Render with one thread; return the picture and the user CPU seconds that it took."""
+    """Render with one thread; return the image and the user CPU seconds that it took."""
     begin = resource.getrusage(resource.RUSAGE_SELF).ru_utime
     picture = wavecomb.render(
         scene, spp=spp, seed=seed, size=size, threads=1, max_depth=7, filter="box",
@@ -127,7 +127,7 @@ def reference(name: str, scene: Any, options: argparse.Namespace) -> Any:
 
 
 def figures(images: Any, mean: Any, variance: Any) -> dict[str, Any]:
-    """Return error statistics of images; the variance of the reference is subtracted from means."""
+    """Return error statistics of images; mean errors exclude the variance of the reference."""
     scale = 1 / (mean**2 + 0.01)
     errors = ((images - mean) ** 2 * scale).mean(axis=-1).reshape(len(images), -1)
     noise = (variance * scale).mean(axis=-1).ravel()

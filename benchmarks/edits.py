@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Measure the time of edits: of the camera, a material, a light, and the move of an object.
+"""Measure the time to edit the camera, a material or a light, and to move an object.
 
 For each stage, prints the milliseconds and CPU milliseconds of the first edit of each kind and of
 the fastest of ten further edits. Edits the first material, the first light and the first mesh.
@@ -19,7 +19,7 @@ COUNT = 10
 
 
 def edits_of(renderer, stage):
-    """Returns a function for each kind of edit; its argument is a small amount of change."""
+    """Returns a function for each kind of edit, which takes the amount of change."""
     from pxr import UsdGeom
 
     from wavecomb.usd import LoadReport, open_stage

@@ -24,7 +24,7 @@ _PARTS: dict[str, tuple[dict[str, Any], tuple[float, float, float], float]] = {
 
 
 def write(path: Path) -> Path:
-    """Write the stage and the stages it references, with camera and lights of ``heavy``."""
+    """Write the stage and the stages it references, with camera and lights of scene ``heavy``."""
     path.parent.mkdir(parents=True, exist_ok=True)
     stage = Usd.Stage.CreateNew(str(path))
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compare rendering an image in tiles by N workers with one process of N threads.
+"""Compare rendering an image in tiles on N workers with rendering it on N threads of one process.
 
     python benchmarks/farm.py out/mixed.usdc --size 600 400 --spp 64 --workers 2 --rounds 3
 
@@ -51,7 +51,7 @@ def timed(*words: object) -> tuple[float, float]:
 
 
 def small_tasks(stage: Path, workers: int, count: int) -> dict[str, float]:
-    """Overhead in milliseconds for each of ``count`` tiles of 8 x 8 pixels.
+    """Measure the farm's overhead per tile, in milliseconds, for ``count`` tiles of 8 x 8 pixels.
 
     Tiles are rendered once by one process, without a scheduler, and once by the farm, whose workers
     have opened the stage before the clock starts. Both renders write the same files.
@@ -108,7 +108,7 @@ def moving(stage: Path, place: Path, frames: int) -> Path:
 
 
 def differing(place: Path, frames: int) -> int:
-    """Return the number of frames of which the two renders differ in any layer."""
+    """Return the number of frames in which any layer differs between the two renders."""
     from wavecomb.image.files.image import read_layers
 
     found = 0

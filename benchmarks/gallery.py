@@ -6,7 +6,7 @@
 
 Each stage is rendered by ``wavecomb render`` in a separate process, which is stopped at the time
 limit. The page, index.html in the output folder, shows the image, seconds, memory, unsupported
-features and warnings of each stage. Exit code 1 if a stage failed or was stopped.
+features and warnings of each stage. The exit code is 1 if a stage failed or was stopped.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ img {{ width: 100%; background: #888 }} .no {{ color: #a40 }} .bad {{ color: #c3
 
 @dataclass
 class Entry:
-    """Result of one stage; ``reference`` is an image to show beside it."""
+    """Result of one stage; ``reference`` is an image to show beside the render."""
 
     name: str
     about: str = ""

@@ -7,13 +7,14 @@
 
 Renders each stage in each mode, with several seeds in turn; the first mode is the baseline.
 Mode ``power`` trains nothing, and ``off`` is the default, which calibrates light shares. Other
-modes are names of trained features in ``PARTS``, joined by ``+``. Stages are generated in exporter
-style (``--plain``) or files; with the suffix ``-lamps`` they are lit by a key light, a fill light
-and a dim dome. The filter is a box of one pixel. relMSE is that of one image: the variance over
-seeds at each pixel, divided by the square of the mean of all images plus 0.01, since all modes have
-the same mean. Efficiency is 1 / (relMSE x seconds). Seconds are CPU time including training, so
-that other work on the machine has little effect. With ``--seconds``, each render ends after this
-wall time, training included, and seconds are wall time.
+modes are names of trained features in ``PARTS``, joined by ``+``. Stages are files, or are
+generated in exporter style (``--plain``). Stages with the suffix ``-lamps`` are lit by a key light,
+a fill light and a dim dome. The pixel filter is a box of one pixel. The relMSE of one image is the
+variance over seeds at each pixel, divided by m^2 + 0.01, where m is the mean of all images. The
+images of all modes are averaged because all modes have the same expectation. Efficiency is 1 /
+(relMSE x seconds). Seconds are CPU time including training, so that other work on the machine has
+little effect. With ``--seconds``, each render ends after this wall time, training included, and
+seconds are wall time.
 """
 
 from __future__ import annotations

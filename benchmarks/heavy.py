@@ -11,7 +11,7 @@ and the spread of material costs, and writes all results to a JSON file. All ima
 equal.
 
 Results are medians over rounds with 95 % intervals, relative to arrival order in the same round:
-shade + order time (shading including the cost of its order), and the time of the render.
+the time of shading plus ordering, and the render time.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-r"""Count instructions per shaded hit with valgrind, which the load of the machine cannot affect.
+r"""Count instructions per shaded hit with valgrind, independent of the load of the machine.
 
     .venv/bin/python benchmarks/instructions.py cornell.usda                # this tree
     .venv/bin/python benchmarks/instructions.py cornell.usda ../old ../new  # others for comparison
 
-valgrind does not support AVX-512, so a tree must be built for an older instruction set:
+valgrind does not support AVX-512, so a source tree must be built for an older instruction set:
 
     .venv/bin/python -m pip install --no-build-isolation --no-deps -e . \
         --config-settings=build-dir=build/editable \
@@ -13,7 +13,8 @@ valgrind does not support AVX-512, so a tree must be built for an older instruct
 Each source tree renders the stage in its Python environment, at 96 x 96 pixels with one thread and
 8 SIMD lanes, once with 4 and once with 20 samples per pixel. The difference in instructions is
 divided by the difference in shaded hits, which excludes loading and scene construction. The library
-`_core` does camera rays, ordering, shading and film; `libembree4` does traversal.
+`_core` has the code for camera rays, ordering, shading and film, and `libembree4` that for
+traversal.
 """
 
 from __future__ import annotations

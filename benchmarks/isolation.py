@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Measure the cost of the child process (docs/decisions/sandbox.md).
+"""Measure the cost of isolating commands in a child process (docs/decisions/sandbox.md).
 
     .venv/bin/python benchmarks/isolation.py out/mixed.usdc --prims 100000
 
 Runs ``wavecomb info`` on each stage with --isolate off and on (with the sandbox where the system
-supports it), and with --sandbox off and on. Configurations alternate, so that a busy machine
-affects all alike. Results are medians. CPU seconds include child processes; memory is that of the
-largest process.
+supports it), and with --sandbox off and on. Configurations alternate, so that other work on the
+machine affects them equally. Results are medians. CPU seconds include child processes; memory is
+that of the largest process.
 """
 
 from __future__ import annotations

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Measure the gain of --equiangular: a light in a box of fog, as a volume and inside a mesh.
+"""Measure the gain of --equiangular for a light in a box of fog, given as a volume or a mesh.
 
     .venv/bin/python benchmarks/lamps_in_fog.py
 
 For several lights and extinctions, prints the relative variance of a pixel at 32 samples (mean over
 pixels without the worst thousandth), the relative variance of the image (sum of variances over sum
-of squares), and the seconds of one thread. The gain of each variance is variance x seconds without
---equiangular, divided by variance x seconds with it.
+of squares), and the CPU seconds. The gain for each variance is variance x seconds without
+--equiangular, divided by variance x seconds with --equiangular.
 """
 
 from __future__ import annotations

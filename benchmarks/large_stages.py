@@ -3,10 +3,10 @@
 
     .venv/bin/python benchmarks/large_stages.py --gb 12     # 12 GB of disk for each, one at a time
 
-The benchmark has two kinds of stages, as in production shots. `cache` is one .usdc with the points
-of a sea of a million points for each frame, rendered at one frame. `parts` has a hundred payloads
-with a mesh each, and is rendered with a `--mask` that loads a single payload. Each stage is
-compared with a copy without the data that the frame does not need.
+The benchmark has two kinds of stages, as in production shots. `cache` is one .usdc file of a sea
+surface that has a million points in every frame; one frame is rendered. `parts` has a hundred
+payloads, each with one mesh, and is rendered with a `--mask` that loads a single payload. Each
+stage is compared with a copy without the data that the frame does not need.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ def render(path: Path, options: tuple[str, ...]) -> tuple[float, float, float]:
 
 
 def sea(side: int, frame: int) -> NDArray[np.float32]:
-    """Return points of a moving sea, (side^2, 3), with noise so that files do not compress well."""
+    """Return points of a moving sea, (side^2, 3), with noise that makes files hard to compress."""
     x = np.linspace(-1, 1, side, dtype=np.float32)
     u, v = np.meshgrid(x, x, indexing="ij")
     rough = np.random.default_rng(frame).random((side, side), np.float32)

@@ -4,11 +4,11 @@
     .venv/bin/python benchmarks/light_selection.py
     .venv/bin/python benchmarks/light_selection.py --quick       # check that it runs
 
-Uses the street of `wavecomb scene lights`, whose total light is the same with 10 and with 10,000
-lights. For each number of lights, each of `--rounds` rounds has one render by power and one by tree
-with the same seed. Errors are those of the layer `direct`, and of `direct` plus `indirect`; lights
-that the camera sees directly do not depend on selection. Most of the error of indirect light comes
-from rare paths that end close to a light, which light selection cannot find.
+Uses the street of `wavecomb scene lights`, which has the same total light for any number of lights
+from 10 to 10,000. For each number of lights, each of `--rounds` rounds has one render by power and
+one by tree with the same seed. Errors are those of the layer `direct`, and of `direct` plus
+`indirect`; lights that the camera sees directly do not depend on selection. Most of the error of
+indirect light comes from rare paths that end close to a light, which light selection cannot find.
 
 Results are ratios of selection by tree to selection by power unless stated otherwise:
 
@@ -16,7 +16,7 @@ Results are ratios of selection by tree to selection by power unless stated othe
 - time: render seconds, median of the rounds with its 95 % interval;
 - efficiency: error x time by power / error x time by tree, which is the ratio of errors at equal
   time, for direct light and for all light;
-- us a sample: microseconds per sample by tree, for all threads together.
+- us a sample: microseconds per sample with selection by tree, for all threads together.
 """
 
 from __future__ import annotations

@@ -4,18 +4,18 @@
     .venv/bin/python benchmarks/light_weights.py
     .venv/bin/python benchmarks/light_weights.py --quick       # check that it runs
 
-`studio` is lit by a key light, a fill light and a dim dome, as many stages are. Further stages are
-those of benchmarks/light_selection.py and of the isolation benchmark. For each seed there is a
-render with `light_weights` power and one with calibration. Mitsuba 3 selects lights uniformly. It
-renders `studio` from the same arrays with the samplers independent and `multijitter`, compared with
-a converged image of Mitsuba.
+The stage `studio` has a key light, a fill light and a dim dome, as is common. Further stages are
+those of benchmarks/light_selection.py and of the isolation benchmark. For each seed, one render
+uses `light_weights` power and another uses calibrated shares. Mitsuba 3 selects lights uniformly.
+It renders `studio` from the same arrays with the samplers `independent` and `multijitter`, and its
+images are compared with a converged image by Mitsuba.
 
 Results:
 
 - relMSE: mean of (x - r)^2 / (r^2 + 0.01) at equal samples, minus the noise of the reference;
 - trimmed: relMSE without the worst 0.1 % of pixels, which a few bright paths dominate;
 - ratio: calibrated / power within a round, median with its 95 % interval;
-- calibration: seconds for an image of `--timed-size`, and the fraction of a 10 s render.
+- calibration: seconds of calibration for an image of `--timed-size`, also as a fraction of 10 s.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ import wavecomb
 
 Picture = NDArray[np.float64]
 OUTLIERS = 1e-3
-"""Fraction of the pixels, those with the largest errors, that the trimmed error leaves out."""
+"""Fraction of the pixels that the trimmed error leaves out; these have the largest errors."""
 STAGES: dict[str, tuple[str, dict[str, Any]]] = {
     "studio": ("studio", {"triangles": 20_000}),
     "mixed": ("mixed", {"triangles": 50_000}),

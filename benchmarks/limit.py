@@ -4,23 +4,24 @@
     .venv/bin/python benchmarks/limit.py --spp 16 --threads 2 --rounds 5
     .venv/bin/python benchmarks/limit.py --quick          # check that it runs
 
-Each stage is rendered once with its rays recorded: all rays, by wave and wave stage, in traversal
-order. Embree alone then traces them in the same order on the same number of threads, in a plain
-loop around rtcIntersect and rtcOccluded that fills a packet, calls and counts hits, without filters
-and without storing results. First, each kind of ray (camera, bounce, shadow) is traced with each
-packet width and with each value of Embree's coherence flag, to find the fastest combination for the
-kind. A round then measures, in shuffled order:
+Each stage is rendered once while all rays are recorded, by wave and wave stage, in traversal order.
+Embree alone then traces them in the same order on the same number of threads, in a plain loop that
+fills a packet, calls rtcIntersect or rtcOccluded, and counts hits, without filters and without
+storing results. First, each kind of ray (camera, bounce, shadow) is traced with each packet width
+and with each value of Embree's coherence flag, to find the fastest combination for the kind. A
+round then measures, in shuffled order:
 
 - render: the render, without a recorder;
 - alone: wall time of Embree alone, with the fastest combination for each kind of ray;
-- calls: the same rays through the accelerator's functions, as the render calls them. The
-  accelerator's functions fill packets, keep hits canonical by a filter, and store hits.
+- calls: the same rays, traced by the accelerator's functions that the render calls. These functions
+  fill packets, use a filter that makes hits canonical (independent of packet width and ray order),
+  and store hits.
 
 Ratios are taken within a round:
 
 - limit: render / alone, both wall time;
 - traversal: the trace and shadow phases (per thread) / alone;
-- calls: calls / alone, that is the cost of filter, set-up and storing of hits;
+- calls: calls / alone, which shows the cost of the filter, of filling packets and of storing hits;
 - filter share: (calls - alone) / the trace and shadow phases, which is the fraction of these phases
   that the filter takes.
 """

@@ -5,9 +5,10 @@
     .venv/bin/python benchmarks/loading.py --rounds 9 --stages mixed --threads 2 --output my.json
 
 Each measurement is a new process that reads a stage, renders it with 1 sample per pixel and writes
-an EXR file, as ``wavecomb render`` does. Stages alternate in shuffled rounds. Times count from just
-before the process starts. Files are in the page cache, because each stage is first read once
-without measurement. Writes all measurements as JSON, and prints the median, minimum and maximum.
+an EXR file, as ``wavecomb render`` does. Stages alternate in shuffled rounds. Times are measured
+from just before the process starts. Files are in the page cache, because each stage is first read
+once without measurement. Writes all measurements as JSON, and prints the median, minimum and
+maximum.
 """
 
 from __future__ import annotations

@@ -4,10 +4,10 @@
     .venv/bin/python benchmarks/materials_page.py
     .venv/bin/python benchmarks/materials_page.py cornell-box MaterialXTest -o out/looks --spp 256
 
-The stages are in ../shared/assets/usd. Names select stages by a part of their path. The page,
+The stages are in ../shared/assets/usd. A name selects the stages whose path contains it. The page,
 index.html in the output folder, shows our image beside the one in the stage's repository, if there
-is one, and below it the stage's documentation, unsupported features and warnings. Exit code 1 if a
-stage failed.
+is one, and below it the stage's documentation, unsupported features and warnings. The exit code is
+1 if a stage failed.
 """
 
 from __future__ import annotations
@@ -144,7 +144,7 @@ def exhibits() -> Iterator[Exhibit]:
 
 
 def document_of(stage: Path) -> Path | None:
-    """The nearest README at or above a stage."""
+    """Return the nearest README in the folder of a stage or above."""
     for folder in stage.parents:
         if folder == ROOT.parent:
             break
@@ -155,7 +155,7 @@ def document_of(stage: Path) -> Path | None:
 
 
 def said_of(stage: Path) -> str:
-    """Return the sentence in a README that follows a stage's name, or else its first sentence."""
+    """Return the sentence after a stage's name in a README, or else the README's first sentence."""
     document = document_of(stage)
     if document is None:
         return ""
@@ -171,7 +171,7 @@ def said_of(stage: Path) -> str:
 
 
 def picture_of(exhibit: Exhibit) -> Path | None:
-    """Image of a stage in its documentation, if there is one."""
+    """Return the image of a stage in the stage's documentation, if there is one."""
     stage = ROOT / exhibit.stage
     document = document_of(stage)
     if document is None:

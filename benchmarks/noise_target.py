@@ -5,22 +5,23 @@
     .venv/bin/python benchmarks/noise_target.py --quick          # check that it runs
 
 A pixel that stops as soon as its samples appear to have little noise sometimes stops too early, so
-its mean is biased, mostly towards dark. For each stage and noise target:
+its mean is biased, mostly towards darker values. For each stage and noise target:
 
 - `--seeds` renders stop at the target; n is the mean number of samples per pixel;
-- the same number of plain renders take n samples each;
+- the same number of non-adaptive renders take n samples each;
 - two references with other seeds take 64 n samples each.
 
 Results:
 
-- total bias: relative difference of the adaptive images' mean brightness to the reference's, with
-  its standard error over seeds;
+- total bias: relative difference between the mean brightness of the adaptive images and of the
+  reference, with its standard error over seeds;
 - bias / noise: root mean square of the bias of pixels, divided by the root mean square of the noise
-  of one adaptive render. Bias and noise are relative to brightness, as in relMSE. Squares of bias
-  come from two halves of the seeds and the two references, (a1 - r1) (a2 - r2), so that noise does
-  not count as bias; a negative result means that no bias was detected;
+  of one adaptive render. Bias and noise are relative to brightness, as in relMSE. The square of the
+  bias is estimated as (a1 - r1) (a2 - r2), where a1 and a2 are the mean images of two halves of the
+  seeds and r1 and r2 the references, so that noise does not count as bias; a negative result means
+  that no bias was detected;
 - error: true mean relative error of one adaptive render, which the target limits;
-- gain: relMSE of the plain renders / relMSE of the adaptive renders, at equal samples.
+- gain: relMSE of the non-adaptive renders / relMSE of the adaptive renders, at equal samples.
 """
 
 from __future__ import annotations

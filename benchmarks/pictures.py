@@ -28,7 +28,7 @@ def read(file: Path) -> Pixels:
 
 
 def shrunk(image: Pixels, width: int) -> Pixels:
-    """Shrink an image by block means to a width that divides its width."""
+    """Shrink an image by averaging blocks; its width must be a multiple of the new width."""
     n = image.shape[1] // width
     height = image.shape[0] // n
     blocks = image[: height * n, : width * n].reshape(height, n, width, n, 3)

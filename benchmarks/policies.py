@@ -4,8 +4,8 @@
     .venv/bin/python benchmarks/policies.py                       # generated stages, half an hour
     .venv/bin/python benchmarks/policies.py --files shot.usd ...  # and third-party stages
 
-Each stage is rendered with few and many samples, and in small, default and large waves. All
-policies render each of these cases in shuffled order, in one process. The time of shading plus
+Each stage is rendered with few and many samples, and in small, default and large waves. In each of
+these cases, all policies render in shuffled order, in one process. The time of shading plus
 ordering and the render time of each policy are divided by the times of the best *fixed* policy of
 the case, which has the lowest median. Prints a Markdown table of the worst case of each policy, and
 of every case of the default policy. The JSON file has all results. All images of a case must be

@@ -4,16 +4,16 @@
     .venv/bin/python benchmarks/preview_surface.py
     .venv/bin/python benchmarks/preview_surface.py --roughness 0.2 --base 1 --markdown
 
-For each cosine of the view, prints the fraction of light that a surface in a white furnace
+For each cosine of the viewing angle, prints the fraction of light that a surface in a white furnace
 reflects:
 
 - wavecomb: rendered from USD, one bounce;
 - uncoupled: the earlier model, whose diffuse base is dimmed by the *smooth* interface's
   reflectance;
 - glslfx: numerical integral of Storm's shader in OpenUSD (previewSurface.glslfx);
-- MaterialX: the graph of its library (usd_preview_surface.mtlx): a Lambertian base times 1 - E,
-  with E the rough interface's albedo with Schlick's reflectance;
-- Mitsuba's principled and roughplastic, numerically integrated; left out without Mitsuba.
+- MaterialX: the node graph of the MaterialX library (usd_preview_surface.mtlx), a Lambertian base
+  times 1 - E, where E is the rough interface's albedo with Schlick's reflectance;
+- Mitsuba's principled and roughplastic, integrated numerically if Mitsuba is installed.
 
 Integrals are sums over 512 x 512 directions. docs/decisions/preview-surface.md quotes the results.
 """
@@ -81,7 +81,7 @@ def ggx(wo: Array, wi: Array, alpha: float, fresnel: Callable[[Array], Array]) -
 
 
 def uncoupled(base: float, roughness: float, ior: float) -> Callable[[Array, Array], Array]:
-    """Return the earlier model's BSDF; its base has factor (1 - F(o)) (1 - F(i)) / (1 - F_avg)."""
+    """Return the earlier BSDF, whose base has the factor (1 - F(o)) (1 - F(i)) / (1 - F_avg)."""
     z = np.sqrt((np.arange(4096) + 0.5) / 4096)
     mean = float(exact(z, ior).mean())
 
@@ -159,7 +159,7 @@ def mitsuba_albedos(
 
 
 def rendered(base: float, roughness: float, ior: float, spp: int) -> list[float]:
-    """Render a plane under a uniform sky, seen along each cosine through a narrow camera."""
+    """Render a plane under a uniform sky at each view cosine, by a camera with a narrow view."""
     found = []
     for z in COSINES:
         eye = 20.0 * np.array((0.0, z, np.sqrt(1.0 - z * z)))

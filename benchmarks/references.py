@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Render scenes of other renderers and compare the images with theirs.
+"""Render scenes of other renderers, and compare the images with the images of these renderers.
 
     .venv/bin/python benchmarks/references.py
     .venv/bin/python benchmarks/references.py arnold cbox -o out/references --spp 256
@@ -8,11 +8,11 @@ The scenes and images are in ../shared/assets/reference: tests of Autodesk's arn
 Mitsuba 3. The reference is the stored image, or a new render by Mitsuba where a scene has none.
 Mitsuba (make setup-test) also renders each of its scenes twice: unchanged, to check the stored
 image, and with our approximations of its materials, to show their effect. The page, index.html in
-the output folder, has the images of each scene, their difference and the reasons for it. The page
-also lists the features that a stage cannot express, with reasons. All errors are relative to the
-mean of the reference.
+the output folder, has the images of each scene, their difference and the reasons for the
+difference. The page also lists the features that a stage cannot express, with reasons. All errors
+are relative to the mean of the reference.
 
-Exit code 1 if a scene could not be rendered.
+The exit code is 1 if a scene could not be rendered.
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ from wavecomb.image.working_space import to_rec709
 
 ASSETS = Path(__file__).resolve().parents[2] / "shared" / "assets"
 EDGE = 128
-"""Image edge that --spp refers to: smaller images get more samples, larger ones fewer."""
+"""Image edge for --spp; smaller images get more samples per pixel, larger images fewer."""
 WIDTH = 128
-"""Image width where Mitsuba renders the reference because none is stored."""
+"""Image width of references that Mitsuba renders because no image is stored."""
 SHOWN = 240
 """Approximate height to which small images are enlarged on the page."""
 
@@ -122,7 +122,7 @@ def render(stage: Path, spp: int, **settings: Any) -> tuple[Pixels, Pixels]:
 def entry_of(
     name: str, file: Path, ours: Pixels, variance: Pixels, reference: Pixels, kept: NDArray[Any]
 ) -> Entry:
-    """Compare the pixels of mask ``kept``; write the images with all other pixels darkened."""
+    """Compare the pixels in the mask ``kept``; write the images with all other pixels darkened."""
     mean = max(float(reference[kept].mean(dtype=np.float64)), 1e-12)
     noise = float(np.sqrt(variance[kept].sum(dtype=np.float64))) / variance[kept].size
     found = compare(ours[kept][None], reference[kept][None])
@@ -205,7 +205,7 @@ def name_of(file: Path) -> str:
 
 
 def mitsuba_scenes(scenes: Path) -> list[tuple[Path, Path]]:
-    """Scene files, each with the path where its image may be stored."""
+    """Return scene files, each with the path of its stored image, which may not exist."""
     found = []
     for file in sorted(scenes.rglob("*.xml")):
         if file.parent.name != "fragments":

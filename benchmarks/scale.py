@@ -6,9 +6,9 @@
 
 Each stage is written once (below --folder), then read and rendered with 1 sample per pixel by new
 processes, as ``benchmarks/loading.py`` does. Prints medians of the seconds to load and to build,
-and of the memory relative to the minimum. ``prims`` are meshes of 12 triangles, each in a separate
-Xform; ``instances`` belong to one point instancer; ``natives`` are native instances; ``triangles``
-are in one mesh with normals and texture coordinates.
+and of the peak memory relative to the scene's arrays and BVH. ``prims`` are meshes of 12 triangles,
+each in a separate Xform; ``instances`` belong to one point instancer; ``natives`` are native
+instances; ``triangles`` are in one mesh with normals and texture coordinates.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ FACES = np.array(
 
 
 def write_prims(stage: Usd.Stage, count: int) -> None:
-    """Write ``count`` prims: half are Xforms, half are meshes inside."""
+    """Write ``count`` prims: Xforms with one mesh inside each."""
     for path, place in zip(_paths("/World", count // 2), _places(count // 2), strict=True):
         xform = UsdGeom.Xform.Define(stage, path)
         xform.AddTranslateOp().Set(tuple(map(float, place)))
@@ -69,7 +69,7 @@ def write_natives(stage: Usd.Stage, count: int) -> None:
 
 
 def write_triangles(stage: Usd.Stage, count: int) -> None:
-    """Write a surface of waves."""
+    """Write one mesh of a wavy surface."""
     edge = round((count / 2) ** 0.5)
     mesh = UsdGeom.Mesh.Define(stage, "/World/Waves")
     u, v = np.meshgrid(*[np.linspace(0, 1, edge + 1, dtype=np.float32)] * 2)
@@ -100,12 +100,12 @@ WRITERS: dict[str, Callable[[Usd.Stage, int], None]] = {
 
 
 def _paths(folder: str, count: int) -> list[str]:
-    """``count`` paths, a thousand per folder, because USD is slow with more children per prim."""
+    """Return ``count`` paths, at most 1000 per parent, since USD is slow with more children."""
     return [f"{folder}/G{i // 1000}/P{i}" for i in range(count)]
 
 
 def _places(count: int) -> np.ndarray[Any, Any]:
-    """``count`` positions on a cubic grid, (count, 3)."""
+    """Return ``count`` positions on a cubic grid, (count, 3)."""
     edge = int(np.ceil(count ** (1 / 3)))
     at = np.arange(count)
     return np.stack([at % edge, at // edge % edge, at // edge**2], axis=1).astype(np.float64)

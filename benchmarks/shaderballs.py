@@ -4,8 +4,8 @@
     .venv/bin/python benchmarks/shaderballs.py
     .venv/bin/python benchmarks/shaderballs.py metal coat -o out/balls --ball 160 --spp 256
 
-A sweep is a row of balls in one image; its stage is written next to it. The page is index.html in
-the output folder. Exit code 1 if a stage has warnings, which are printed.
+A sweep is a row of balls in one image. The stage of a sweep is written next to its image. The page
+is index.html in the output folder. The exit code is 1 if a stage has warnings, which are printed.
 """
 
 from __future__ import annotations

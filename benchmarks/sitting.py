@@ -52,7 +52,7 @@ def sitting_parser(doc: str, name: str) -> argparse.ArgumentParser:
 
 
 def sitting_arguments(parser: argparse.ArgumentParser, **quick: Any) -> argparse.Namespace:
-    """Parse the arguments; with --quick, the values ``quick`` replace those of the user."""
+    """Parse the arguments; with --quick, the values in ``quick`` replace the user's values."""
     args = parser.parse_args()
     if args.quick:
         folder = ROOT / "out" / "quick"
@@ -134,7 +134,7 @@ def summary(values: Sequence[float]) -> dict[str, float]:
 
 
 def ratio(ours: Sequence[float], theirs: Sequence[float]) -> dict[str, float]:
-    """Summarize the ratios ours / theirs, each taken within a round."""
+    """Summarise the ratios ours / theirs, each of which is taken within a round."""
     return summary([a / b for a, b in zip(ours, theirs, strict=True)])
 
 

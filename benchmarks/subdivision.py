@@ -5,7 +5,8 @@
 
 Prints the cost of refinement, of Embree's BVH for the resulting triangles, and of Embree's
 subdivision geometry at a tessellation rate of 2^level; one thread each. Compiles
-benchmarks/subdivision_embree.cpp against the staged Embree or the distribution's.
+benchmarks/subdivision_embree.cpp against the Embree in .deps/embree, or else against the
+distribution's Embree.
 """
 
 from __future__ import annotations

@@ -4,10 +4,10 @@
     .venv/bin/python benchmarks/threads.py
     .venv/bin/python benchmarks/threads.py --files shot.usd --size 800 --spp 32
 
-Stages are rendered with 1 and 2 threads, and with 4, 8, 16 and more up to the number of cores, in
-turns of shuffled order, in one process. ``measured`` is the ratio of render times within a round.
-``by groups`` is predicted from the times of groups of waves (``sharing`` in docs/statistics.md), by
-list scheduling of each pass. Time outside of these groups counts unchanged. Prints a table and
+Stages are rendered with 1, 2, 4, 8, 16 and more threads up to the number of cores, in rounds of
+shuffled order, in one process. ``measured`` is the ratio of render times within a round. ``by
+groups`` is predicted from the times of groups of waves (``sharing`` in docs/statistics.md), by list
+scheduling of each pass. Time outside these groups is assumed not to change. Prints a table and
 writes ``results/threads.json``.
 """
 
@@ -80,7 +80,7 @@ def _measure(path: Path, args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _counts() -> list[int]:
-    """Numbers of threads up to the number of cores."""
+    """Return the thread counts to measure, up to the number of cores."""
     cores = len(os.sched_getaffinity(0))
     return [n for n in (1, *TOLD) if n <= cores]
 

@@ -13,9 +13,9 @@ and its errors:
     worst       largest difference of a block of 16 x 16 pixels, in standard errors
     absolute    mean absolute difference, including noise and edges of shapes
 
-Each mean must be within 0.5 %, and each block within the noise of both images at a level of 0.01
-for all blocks of an image together (usdlux_judge.py). Exit code 1 if an image fails, except those
-that NOT_REACHED lists with the reason.
+The means of two images must agree within 0.5 %, and each block within the noise of both images at a
+significance level of 0.01 for all blocks of an image together (usdlux_judge.py). The exit code is 1
+if an image fails and is not listed in NOT_REACHED, which states reasons.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ ASSETS = Path(__file__).resolve().parents[2] / "shared" / "assets"
 CAMERAS = {"iesTest": ("/cameras/iesTop", "/cameras/iesBottom")}
 """Stages whose reference has an image of each camera, one above the other."""
 VISIBLE = ("visibleRect",)
-"""Stages of which the reference images show the lights."""
+"""Stages whose reference images show the lights."""
 LAMBERT = """#usda 1.0
 over "materials" {
     over "usdpreviewsurface1" {
@@ -62,8 +62,8 @@ NOT_REACHED = {
         "the delegate's 1 - cos(0.265 degrees) is 179 steps of a float for 179.45: 0.25 % too dark",
     ),
 }
-"""Reasons why images of stages do not agree with their references. The means of these images must
-still be within 0.5 %."""
+"""Reasons why images of some stages do not agree with their references. The means of these images
+must still be within 0.5 %."""
 NAME = re.compile(r"(?P<stage>\w+)-embree\.(?P<frame>\d+)\.exr")
 
 PAGE = """<!doctype html>

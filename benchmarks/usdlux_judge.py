@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Test whether an image equals a reference within their noise.
+"""Test whether an image equals a reference within the noise of both.
 
 Our image consists of several independent renders, called batches. The reference is a single image
-with an unknown number of samples. The noise of the reference is estimated per block from the
-differences between neighbouring pixels of *reference - ours*, minus the part due to our noise.
-Other differences between neighbouring pixels, such as differently filtered outlines, therefore
-count as noise.
+with an unknown number of samples. The joint noise of both images is estimated per block from the
+differences between neighbouring pixels of *reference - ours*, and is at least the noise of our
+image, which is known from its batches. Other differences between neighbouring pixels, such as
+differently filtered outlines, therefore count as noise.
 
 Noise is assumed to be independent between pixels, so that the variance of a block is the sum over
-its pixels; z is a normal deviate.
+its pixels. Deviations of blocks in standard errors are assumed to be normally distributed.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ MEAN_LIMIT = 0.005
 SIGNIFICANCE = 0.01
 """Significance level for all blocks of an image together, by Sidak's correction."""
 ROUNDING = 1e-3
-"""Blocks that differ by less than this fraction of their value, or of a hundredth of the image
-mean, agree. This tolerance covers half floats, 50 faces around a sphere, and similar negligible
-differences.
+"""Blocks agree if they differ by less than this fraction of their value or of a hundredth of the
+image mean. This tolerance covers negligible differences, for example due to half floats or spheres
+with 50 faces around.
 """
 
 
@@ -37,7 +37,7 @@ class Verdict:
     """Result of testing one image against its reference.
 
     Attributes:
-        difference: Relative difference of the mean to the reference's.
+        difference: Relative difference between the means of the image and the reference.
         worst: Largest deviation of a block, in standard errors, among blocks that differ by more
             than rounding.
         limit: Limit of ``worst``.

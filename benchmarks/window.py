@@ -2,12 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Measure the responsiveness of the window.
 
-For each stage, prints the seconds from reading it to the first image on the screen and to the first
-complete one, images per second and CPU seconds per image while the camera orbits, the scale of
-these images and their noise (mean difference to a median of 3 x 3 pixels, relative to the mean),
-the seconds and CPU seconds from the last movement to an image at full size, milliseconds from stop
-to standstill (median and maximum of ten), and the longest time during which the window did not
-respond. Works without a display.
+Prints for each stage:
+
+- seconds to load the stage, and seconds from then until the first image and until the first
+  complete image are on the screen;
+- images per second and CPU seconds per image while the camera orbits, the scale of these images and
+  their noise (mean difference to a median of 3 x 3 pixels, relative to the mean);
+- seconds and CPU seconds from the last movement of the camera to an image at full size;
+- milliseconds from a request to stop until the render engine is idle (median and maximum of ten);
+- the longest time during which the window did not respond.
+
+Works without a display.
 """
 
 import argparse
@@ -22,7 +27,7 @@ os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 
 def noise_of(image):
-    """Return the noise of an image: its mean difference to a 3 x 3 median filter over its mean."""
+    """Return the mean difference of an image to its 3 x 3 median filter, relative to its mean."""
     import numpy as np
 
     tone = np.sqrt(np.clip(image.mean(axis=2), 0.0, 1.0))

@@ -2,8 +2,8 @@
 """Prints the locations of build inputs that come from wheels.
 
 Output is one line: Dr.Jit's include directory and the directory of oneTBB's CMake config,
-separated by ';'. A directory that is not found is an empty string. The script imports no packages,
-so it is fast and works in isolated builds too.
+separated by ';'. An empty string stands for a directory that was not found. The script imports no
+packages, so it is fast and also works in isolated builds.
 """
 
 import importlib.metadata

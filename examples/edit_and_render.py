@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Changes a material, a light, an object and the camera; renders again without loading."""
+"""Changes a material, a light, an object and the camera, and renders again without reloading."""
 
 from __future__ import annotations
 

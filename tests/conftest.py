@@ -70,7 +70,7 @@ def plain_room(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def forked(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Start the package's processes, such as stage readers, by the fork server of the tests."""
+    """Start the package's processes, such as stage readers, with the tests' fork server."""
     import forks
 
     monkeypatch.setattr(subprocess, "Popen", forks.Popen)

@@ -179,7 +179,7 @@ def _is_python(words: Sequence[str]) -> bool:
 
 
 def _is_booted(words: Sequence[str]) -> bool:
-    """Whether arguments start a command of ``wavecomb.processes`` without other flags of Python."""
+    """Whether arguments start a command of ``wavecomb.processes`` without more Python flags."""
     return words[0] == "-I" and words[1].endswith(os.path.join("wavecomb", "boot.py"))
 
 

@@ -40,17 +40,17 @@ def is_on(name: str, environment: Mapping[str, str] = os.environ) -> bool:
 
 
 def is_strict(environment: Mapping[str, str] = os.environ) -> bool:
-    """Whether a missing requirement is a failure: by `WAVECOMB_STRICT` if set, otherwise in CI."""
+    """Whether a missing requirement is a failure, as `WAVECOMB_STRICT` says or, if unset, in CI."""
     return is_on("WAVECOMB_STRICT" if "WAVECOMB_STRICT" in environment else "CI", environment)
 
 
 def is_long(environment: Mapping[str, str] = os.environ) -> bool:
-    """Whether long tests run: `WAVECOMB_LONG=1`, which `make test-long` sets."""
+    """Whether long tests run, which requires `WAVECOMB_LONG=1` (set by `make test-long`)."""
     return is_on("WAVECOMB_LONG", environment)
 
 
 def missing(part: str) -> str:
-    """Reason why a module, a program (`bin:objdump`) or `userfaultfd` is unavailable, or ''."""
+    """Reason why a module, a program (`bin:objdump`) or `userfaultfd` is missing, or else ''."""
     if part.startswith("bin:"):
         return "" if shutil.which(part[4:]) else f"the program {part[4:]} is not installed"
     if part == "userfaultfd":
@@ -85,7 +85,7 @@ def asset(file: str) -> Path:
 
 
 def written_scenes() -> list[str]:
-    """Names of the scenes that this machine can write and read: reading grids needs OpenVDB."""
+    """Names of the scenes that this machine can write and read; scenes with grids need OpenVDB."""
     from wavecomb import vdb
     from wavecomb.scenes import SCENES
 

@@ -11,9 +11,9 @@ row. The reference is rendered by Wavecomb with other seeds and with light paths
 a pixel. relMSE is the mean of (x - r)^2 / (r^2 + 0.01 mean(r)^2) without the worst thousandth of
 the pixels, for the whole image and
 for the caustics: pixels whose light in the reference comes mostly from light paths. Materials are
-converted as mitsuba_bridge.py and cycles_bridge.py describe. Where a peer's material is an
-approximation, its error includes the difference, so means are printed as well. Mitsuba's ptracer
-has no MIS and cannot render what the camera sees through glass.
+converted as mitsuba_bridge.py and cycles_bridge.py describe. Where the material of another renderer
+is an approximation, its error includes the resulting difference, so image means are printed as
+well. Mitsuba's ptracer has no MIS and cannot render what the camera sees through glass.
 """
 
 from __future__ import annotations
@@ -163,7 +163,7 @@ def picture(
 
 
 def samples(process: Process, args: argparse.Namespace) -> int:
-    """Return the number of samples that fit into ``--seconds``, as a square for multijitter."""
+    """Return the number of samples that fit into ``--seconds``; a square number for multijitter."""
     spp = 4
     while True:
         process.render(spp, TRIAL_SEED)  # compiles kernels

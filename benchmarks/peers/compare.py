@@ -23,7 +23,8 @@ describe the conversion of materials.
   settings.
 - Efficiency is 1 / (relMSE * seconds), with seconds by the marginal rate at full size.
 
-Ratios of Wavecomb to the others are medians within rounds, with a 95 % bootstrap interval.
+Ratios of Wavecomb to other renderers are taken within rounds; results are medians with a 95 %
+bootstrap interval.
 """
 
 from __future__ import annotations
@@ -102,7 +103,7 @@ def measure(scene: str, args: argparse.Namespace) -> dict[str, Any]:
 def differ(ours: Any, theirs: Any) -> dict[str, Any]:
     """Compare converged images by pixel and by blocks of 4 x 4 pixels.
 
-    Only Wavecomb filters textures, so pixels may differ where mean colours do not.
+    Only Wavecomb filters textures, so pixels may differ where the mean colours of blocks agree.
     """
     edge = len(ours) // 4 * 4
     a, b = (

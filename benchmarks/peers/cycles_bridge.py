@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Convert a recorded scene to Cycles: same arrays, lights and camera, closest materials.
 
-Needs the environment of benchmarks/peers/setup and a separate process.
+This module needs the Python environment of benchmarks/peers/setup and a separate process.
 
 Rect and disk lights become area lights (one-sided, invisible to rays), spheres become point lights
 with a radius, distant lights become suns, and the dome becomes the world. Emissive meshes emit to

@@ -23,7 +23,7 @@ class Nodes:
         tree.nodes.clear()
 
     def add(self, kind: str, **inputs: Any) -> Any:
-        """Add a node. Keywords connect or set its inputs; "_" in a keyword stands for a blank."""
+        """Add a node. Keywords connect or set node inputs; "_" in a keyword stands for a space."""
         node = self.tree.nodes.new(kind)
         for name, value in inputs.items():
             socket = node.inputs[name.replace("_", " ")]
@@ -51,7 +51,7 @@ class Nodes:
         return node.outputs["Vector"]
 
     def texture(self, use: dict[str, Any], signed: bool = False) -> Any:
-        """Add a lookup of texel * scale + bias; `signed` leaves texels of normal maps in [0, 1]."""
+        """Add a lookup of texel * scale + bias, or of the plain texel for `signed` normal maps."""
         node = self.tree.nodes.new("ShaderNodeTexImage")
         node.image, node.extension = self.images.get(use["texture"])
         a, b, c, d, e, f = use.get("uv", (1.0, 0.0, 0.0, 0.0, 1.0, 0.0))
@@ -86,7 +86,7 @@ class Nodes:
 
 
 class Images:
-    """Blender images of recorded textures, each made once; 8-bit textures stay 8-bit."""
+    """Blender images of recorded textures, made once for each; 8-bit textures stay 8-bit."""
 
     def __init__(self, recorded: Recorded) -> None:
         self.recorded = recorded
@@ -187,7 +187,7 @@ def _metal(nodes: Nodes, m: dict[str, Any]) -> Any:
 
 
 def _dielectric(nodes: Nodes, m: dict[str, Any]) -> Any:
-    """Convert glass. Its tint is squared because Principled transmits the root of base colour."""
+    """Convert glass. The tint is squared, since Principled transmits the root of base colour."""
     tint = np.asarray(m.get("base_color", (1.0,) * 3))
     node = nodes.add(
         "ShaderNodeBsdfPrincipled",
@@ -202,7 +202,7 @@ def _dielectric(nodes: Nodes, m: dict[str, Any]) -> Any:
 
 
 def _principled(nodes: Nodes, m: dict[str, Any]) -> Any:
-    """Convert `principled`, and `plastic`, a diffuse base under a dielectric interface."""
+    """Convert `principled` or `plastic`, which is a diffuse base under a dielectric interface."""
     node = nodes.add(
         "ShaderNodeBsdfPrincipled",
         Base_Color=nodes.parameter(m, "base_color", (0.18,) * 3),

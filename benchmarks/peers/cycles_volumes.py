@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Convert recorded volumes to Cycles. Grids are read from .vdb files; others become boxes."""
+"""Convert volumes to Cycles. Grids are read from .vdb files; other volumes become boxes."""
 
 from __future__ import annotations
 

@@ -3,10 +3,10 @@
 
 Exact equivalents: geometry; rect, disk, sphere and dome lights; closed emissive meshes (Wavecomb's
 emit to both sides, Mitsuba's outwards); diffuse, smooth metal with measured index, smooth
-dielectric; the camera with a box filter. GGX agrees within noise if multiple scattering between
-microfacets is small, which Mitsuba does not compensate. Approximations: metal by colour (no Schlick
-in Mitsuba), plastic, principled, and OpenPBR except for its glass and its metal without a tint. A
-distant light with an angle becomes a distant sphere.
+dielectric; the camera with a box filter. GGX agrees within noise where multiple scattering between
+microfacets, which Mitsuba ignores, is small. Approximations: metal defined by colours (Mitsuba has
+no Schlick reflectance), plastic, principled, and OpenPBR except for its glass and its metal without
+a tint. A distant light with an angle becomes a distant sphere.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from recorded import INHERIT, Mesh, Placed, Recorded
 
 Matrix = NDArray[np.float64]
 _TURN = np.diag([-1.0, 1.0, -1.0, 1.0])
-"""Half a turn about y, from objects that point along -z to Mitsuba's, which point along +z."""
+"""Half a turn about y, since Mitsuba's objects point along +z and USD's along -z."""
 
 MOST_PATHS = 1 << 25
 """Maximum number of paths per pass: the vectorised variants hold all paths of a pass in memory,
@@ -38,7 +38,7 @@ _FAR = 1e4
 
 
 def find_llvm() -> bool:
-    """Set the path of a libLLVM that Dr.Jit can use (16 or newer), unless the environment has one.
+    """Set the path of a libLLVM that Dr.Jit can use (16 or newer), unless the environment sets it.
 
     Returns whether a usable libLLVM exists; Dr.Jit would end the process with an older version.
     """
@@ -236,7 +236,7 @@ class MitsubaScene:
         return {"type": "rgb", "value": [float(v) for v in colour]}
 
     def _lamp(self, shape: dict[str, Any], radiance: NDArray[Any]) -> dict[str, Any]:
-        """Return an emissive shape that is black, since Mitsuba's default BSDF reflects a half."""
+        """Return an emissive shape with a black BSDF; Mitsuba's default BSDF reflects 50 %."""
         shape["emitter"] = {"type": "area", "radiance": self._rgb(radiance)}
         shape["bsdf"] = {"type": "diffuse", "reflectance": self._rgb(np.zeros(3))}
         return shape

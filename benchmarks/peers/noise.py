@@ -17,11 +17,11 @@ Picture = NDArray[np.float64]
 _BATCH = 256
 """Samples per pixel of one batch of a converged image; a square, as multijitter requires."""
 _REFERENCE = {"mitsuba": "mitsuba-llvm-multijitter", "cycles": "cycles-no-tree"}
-"""Renderer of the converged image of a family; other renderers make their own."""
+"""Renderer that makes a family's converged image; in other families, each renderer makes one."""
 
 
 _OUTLIERS = 1e-3
-"""Fraction of the pixels, those with the largest errors, that the trimmed error leaves out."""
+"""Fraction of the pixels that the trimmed error leaves out; these have the largest errors."""
 
 
 def rel_errors(picture: Picture, reference: Picture) -> Picture:
@@ -47,7 +47,8 @@ class Noise:
         """Measure the relMSE of each seed, minus the error of the converged image, and their mean.
 
         A few pixels with bright caustic paths make relMSE vary by chance. The trimmed error leaves
-        out the worst 0.1 % of pixels and is divided by 1 + N / N_ref instead.
+        out the worst 0.1 % of pixels. It is divided by 1 + N / N_ref, and the error of the
+        converged image is not subtracted.
         """
         options = self.ours if name == "wavecomb" else {}
         family = RENDERERS[name].family
@@ -89,10 +90,11 @@ class Noise:
         return np.asarray(found, np.float64)
 
     def _converged(self, name: str) -> tuple[Picture, float]:
-        """Return the mean of batches with other seeds, and its relMSE, estimated from their spread.
+        """Return the mean of batches with other seeds, and the relMSE of this mean.
 
         The expected (x - r)^2 of an image x and a reference r is var x + var r, so var r is
-        subtracted. Where errors fall as 1 / N, subtracting var r equals division by 1 + N / N_ref.
+        subtracted. If errors fall as 1 / N, this has the same effect as division by 1 + N / N_ref.
+        The relMSE of the mean is estimated from the spread of the batches.
         """
         options = self.ours if name == "wavecomb" else {}
         batches = max(2, self.reference_spp // _BATCH)
@@ -111,7 +113,7 @@ class Noise:
 
 
 class _Lazy:
-    """Process of a renderer, started when an image or the renderer's version is first needed."""
+    """Process of a renderer; it starts when an image or the renderer's version is first needed."""
 
     _versions: ClassVar[dict[str, str]] = {}
 

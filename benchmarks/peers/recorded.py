@@ -28,7 +28,7 @@ class Curves:
     radii: NDArray[np.float32]
 
     def strands(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Indices of the points that each curve passes through, and their number per curve."""
+        """Return the indices of the points on all curves, and the number of points per curve."""
         ahead = 3 if self.kind.startswith("cubic") else 1
         first = (self.segments & 0x3FFFFFFF).astype(np.int64)
         ends = (self.segments & (1 << 30)) == 0
@@ -53,7 +53,7 @@ class Mesh:
 
 @dataclass(frozen=True)
 class Placed:
-    """Instance of a mesh. The transform is for row vectors; `material` is inherited."""
+    """Instance of a mesh. The transform is for row vectors; `material` includes inheritance."""
 
     mesh: int
     transform: Matrix

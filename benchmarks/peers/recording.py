@@ -170,7 +170,7 @@ class RecordingBuilder(Recorded):
         name: str = "",
         is_signed: bool = False,
     ) -> _Grid:
-        """Make a voxel grid. It is recorded when ``add_volume`` is called with it."""
+        """Make a voxel grid. The grid is recorded when ``add_volume`` uses it."""
         native = _core.VolumeGrid(origins, values, index_to_object, background, name, is_signed)
         arrays = {"origins": origins, "values": values, "background": background,
                   "index_to_object": np.asarray(index_to_object, np.float64)}  # fmt: skip
@@ -189,7 +189,7 @@ class RecordingBuilder(Recorded):
         self.native.set_camera(transform, **options)
 
     def build(self) -> RecordingBuilder:
-        """Build the native scene; return this recording in its place."""
+        """Build the native scene, but return this recording."""
         self.scene = self.native.build()
         self.bounds = np.array(self.scene.bounds, np.float64).reshape(2, 3)
         return self

@@ -23,7 +23,7 @@ class Renderer:
         kind: Name of the renderer in worker.py.
         options: Options of the renderer.
         spp: Samples per pixel of the short and of the long timed render. Slower renderers take
-            fewer samples, so that all renders take about as long. Mitsuba's multijitter requires
+            fewer samples, so that all renders take a similar time. Mitsuba's multijitter requires
             squares.
         warm: Whether to render both sample counts before timing, since Dr.Jit compiles for each.
     """

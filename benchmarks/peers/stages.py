@@ -52,7 +52,7 @@ def write_stage(name: str, path: Path, plain: bool) -> Path:
 
 
 def _write_below(name: str, path: Path) -> Path:
-    """Write a stage whose hair has one colour, since the other renderers have none per strand."""
+    """Write a stage whose hair has one colour, since other renderers get no colour per strand."""
     base = path.with_name(f"{path.stem}-base.usdc")
     write_scene(name, base, aspect=1.0)
     stage = Usd.Stage.Open(str(base))

@@ -9,9 +9,9 @@ Then the worker answers each request {"spp", "seed", "image": path or null} with
 
     {"spp", "seconds", "mean", "rays", "peak_mb"}
 
-In this object spp is the number after rounding by the sampler, seconds is the time of the render
-call, and rays may be null. The image is saved at the path as .npy (height, width, 3). compare.py
-starts this program; Cycles needs the Python of benchmarks/peers/setup.
+In this object, spp is the number of samples after rounding by the sampler, seconds is the time of
+the render call, and rays may be null. The image is saved at the path as .npy (height, width, 3).
+compare.py starts this program; Cycles needs the Python of benchmarks/peers/setup.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ from reference_scenes.stage import Image, StageWriter
 SIZE = (160, 120)
 """Size of all reference images."""
 GAUSSIAN_WIDTH = 3.0
-"""Width of our Gaussian filter that corresponds to Arnold's of width 2, exp(-2 r^2)."""
+"""Width of our Gaussian filter that equals Arnold's filter of width 2, exp(-2 r^2)."""
 
 
 @dataclass
@@ -31,8 +31,8 @@ class Test:
 
     Attributes:
         stage: The file to render.
-        covered_only: Compare only pixels with alpha in the reference, for tests with an invisible
-            dome.
+        covered_only: Compare only pixels with nonzero alpha in the reference, for tests with an
+            invisible dome.
         space: Colour space that Arnold rendered in; the stored reference image is in Rec.709.
         notes: Description of the translation.
     """
@@ -49,7 +49,7 @@ def to_stage(folder: Path, file: Path) -> Test:
 
 
 def ass_nodes(text: str) -> dict[str, dict[str, list[str]]]:
-    """Parse an .ass file: node type -> parameter -> words, from the last node of each type."""
+    """Parse the last node of each type in an .ass file; return type -> parameter -> words."""
     nodes: dict[str, dict[str, list[str]]] = {}
     for kind, body in re.findall(r"^(\w+)\s*\{(.*?)^\s*\}", text, re.MULTILINE | re.DOTALL):
         found: dict[str, list[str]] = {}
@@ -132,7 +132,7 @@ class _Translator:
                 self._standard_surface(UsdGeom.Gprim(prim))
 
     def _standard_surface(self, gprim: UsdGeom.Gprim) -> None:
-        """Make Arnold's default shader, or that of the .ass file, with MaterialX."""
+        """Make Arnold's default shader, or the shader in the .ass file, with MaterialX."""
         colours = gprim.GetDisplayColorAttr().Get()
         colour = colours[0] if colours else (0.8, 0.8, 0.8)
         inputs = {"base": 1.0, "base_color": colour}
@@ -187,7 +187,7 @@ class _Translator:
         self._note(f"{_kind(shader)} of {kind} becomes emission by its image")
 
     def _coloured_instances(self, reader: UsdShade.Shader) -> None:
-        """Use colours read by user_data_rgb as displayColor of instances without material."""
+        """Convert colours read by user_data_rgb to displayColor, for instances without material."""
         name = str(reader.GetInput("attribute").Get())
         for prim in list(self.stage.Traverse()) + list(self.stage.TraverseAll()):
             primvar = UsdGeom.PrimvarsAPI(prim).GetPrimvar(name)

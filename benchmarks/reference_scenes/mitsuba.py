@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Convert Mitsuba 3's XML scenes to USD stages.
 
-Mitsuba's parser reads the file and its loaders the meshes; this module translates each plugin.
-Exact equivalents: diffuse, smooth conductors by index, smooth dielectrics, plastic, GGX with little
-multiple scattering, all emitters except spots and projectors, and cameras. Approximations, listed
-in ``Film.notes``: Beckmann becomes GGX of the same alpha, plastic is linear, and emitters do not
-reflect. ``mitsuba_scene.referee`` applies the same approximations to the Mitsuba scene, so that
-Mitsuba shows their effect on the image.
+Mitsuba's parser reads the file, and Mitsuba's loaders read the meshes; this module translates each
+plugin. Exact equivalents: diffuse, smooth conductors by index, smooth dielectrics, plastic, GGX
+with little multiple scattering, all emitters except spots and projectors, and cameras.
+Approximations, listed in ``Film.notes``: Beckmann becomes GGX of the same alpha, plastic is linear,
+and emitters do not reflect. ``mitsuba_scene.referee`` applies the same approximations to the
+Mitsuba scene, so that Mitsuba shows their effect on the image.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from reference_scenes.stage import TURN, Image, Inexpressible, Matrix, StageWrit
 
 MESHES = ("obj", "ply", "serialized")
 GAUSSIAN_WIDTH = 3.0
-"""Width of our Gaussian filter with the standard deviation of Mitsuba's default, half a pixel."""
+"""Width that gives our Gaussian filter Mitsuba's default standard deviation of half a pixel."""
 
 
 @dataclass
@@ -265,7 +265,7 @@ class _Translator:
         return self.out.material("diffuse", {"diffuseColor": (0.5, 0.5, 0.5)}), None
 
     def _material(self, number: int) -> tuple[str, Callable[[Any], Any] | None]:
-        """Return the material's path; and, if meshes need colours, the function that makes them."""
+        """Return the material's path and, if meshes need colours, a function that makes them."""
         scene, kind, props = self.scene, self.scene.kind(number), self.scene.props(number)
         if kind == "twosided":
             return self._material(next(scene.all_of(number, "BSDF")))
@@ -370,7 +370,7 @@ class _Translator:
         return self.out.material("diffuse", {}, textures={"diffuseColor": use}), None
 
     def _blend(self, number: int) -> tuple[str, Callable[[Any], Any] | None]:
-        """Convert a blend of two diffuse BSDFs by a mesh attribute to one with the mean colour."""
+        """Convert two diffuse BSDFs, blended by a mesh attribute, to one with blended colours."""
         parts = list(self.scene.all_of(number, "BSDF"))
         (texture,) = self.scene.all_of(number, "Texture")
         simple = all(self.scene.kind(p) == "diffuse" and not self.scene.children(p) for p in parts)

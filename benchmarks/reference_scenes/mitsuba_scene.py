@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Mitsuba 3's XML scenes read by its parser, and Mitsuba as a reference renderer."""
+"""Mitsuba 3's XML scenes, which Mitsuba's parser reads, and Mitsuba as a reference renderer."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Scene:
     """A parsed scene, which consists of nodes that refer to each other by index."""
 
     def __init__(self, mi: Any, file: Path, width: int = 0) -> None:
-        """Parse a file. ``width`` sets the image width at equal aspect ratio; 0 keeps the size."""
+        """Parse a file. ``width`` scales the image to this width in pixels; 0 keeps the size."""
         self.mi = mi
         self.file = file
         self.config = mi.parser.ParserConfig(mi.variant())
@@ -54,7 +54,7 @@ class Scene:
         return (n for n in self.children(number).values() if self.category(n) == category)
 
     def path(self, name: str) -> Path | None:
-        """A file that the scene refers to; None if it does not exist."""
+        """Return a file that the scene refers to, or None if the file does not exist."""
         here = self.file.parent
         for folder in (here, *(here / file for file in self.folders)):
             if (folder / name).is_file():
@@ -62,7 +62,7 @@ class Scene:
         return None
 
     def missing_file(self, number: int) -> str:
-        """First missing file below a node, or ""."""
+        """Return the first missing file below a node, or ""."""
         props = self.props(number)
         if "filename" in props and self.path(str(props["filename"])) is None:
             return str(props["filename"])
@@ -74,7 +74,7 @@ class Scene:
     def colour(
         self, number: int, key: str, default: float = 0.5, emits: bool = False
     ) -> list[float]:
-        """A parameter as linear Rec.709, as Mitsuba converts spectra."""
+        """Return a parameter in linear Rec.709, with Mitsuba's conversion of spectra."""
         props = self.props(number)
         if key not in props:
             return [default] * 3

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Write USD stages for translated reference scenes: cameras, lights, meshes and materials.
 
-Matrices are for column vectors, (4, 4), and map to world space; prims are named in order.
+Matrices are for column vectors, (4, 4), and map to world space. The names of prims end in a running
+number.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ Matrix = NDArray[np.float64]
 Colour = Sequence[float]
 
 TURN = np.diag([-1.0, 1.0, -1.0, 1.0])
-"""Half a turn about y, between objects that point along +z and USD's, which point along -z."""
+"""Half a turn about y, which maps between USD's direction -z and the +z of other renderers."""
 
 
 class Inexpressible(Exception):
@@ -88,7 +89,7 @@ class StageWriter:
         self._place(camera, to_world)
 
     def _light(self, light: Any, to_world: Matrix, colour: Colour) -> Any:
-        """Set intensity to the largest channel, because UsdLux colours are between 0 and 1."""
+        """Set intensity to the largest channel, so that the UsdLux colour is between 0 and 1."""
         most = max(*(float(c) for c in colour), 1e-12)
         light.CreateIntensityAttr(most)
         light.CreateColorAttr(Gf.Vec3f(*(float(c) / most for c in colour)))

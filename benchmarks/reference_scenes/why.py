@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reasons why images differ from their references, and scenes that are not compared.
 
-These explanations complement the notes of the translators. Each explanation also states how it was
-verified.
+The reasons complement the notes of the translators. Each reason also states how it was verified.
 """
 
 _LAMP = "Wavecomb's light reflects nothing; with a black light Mitsuba renders our image (as ours)"

@@ -15,8 +15,8 @@ import sys
 def _is_command() -> bool:
     """Returns whether this process runs the command ``wavecomb`` instead of a user's program.
 
-    ``sys.argv`` is ``["-m", ...]`` while ``python -m`` imports a package, and a process of
-    ``multiprocessing`` copies it from its parent.
+    ``sys.argv`` is ``["-m", ...]`` while ``python -m`` imports a package. A process of
+    ``multiprocessing`` copies ``sys.argv`` from its parent.
     """
     words, given = sys.orig_argv, sys.argv
     return 0 < len(given) <= len(words) and words[-len(given)].rpartition("/")[2] == "wavecomb"

@@ -31,6 +31,7 @@ def write(path: str, grids: list[dict[str, Any]]) -> None:
     """Writes a .vdb file.
 
     Each grid has a name, origins (n, 3) int32, values (n, 512, channels) float32,
-    index_to_object (16 numbers), boxes (first index, last index, value), and whether values are
-    stored in 16 bits (half) and nodes of one value as tiles. Raises OSError.
+    index_to_object (16 numbers), boxes (first index, last index, value), and two flags: whether
+    values are stored in 16 bits (half), and whether nodes of one value are stored as tiles. Raises
+    OSError.
     """

@@ -46,8 +46,9 @@ def load(
     """Reads a USD stage.
 
     Args:
-        path: .usd, .usda, .usdc or .usdz; or a ``Usd.Stage``, also one in memory or with unsaved
-            edits. Only the session layer of a given stage changes, if ``variants`` are given.
+        path: .usd, .usda, .usdc or .usdz; or a ``Usd.Stage``, which may be in memory or have
+            unsaved edits. A given ``Usd.Stage`` stays unchanged, except for its session layer if
+            ``variants`` are given.
         options: Load options.
         progress: Called as progress(prims read, prims found so far) at intervals.
         isolate: Deprecated and without effect: a stage is read in the calling process.
@@ -78,7 +79,7 @@ def load(
 
 
 def warn_deprecated(**given: object) -> None:
-    """Warns about deprecated arguments, which once configured a child process for loading."""
+    """Warns about deprecated arguments, which configured a child process in earlier versions."""
     import warnings
 
     for name in (name for name, value in given.items() if value is not None):
@@ -120,13 +121,13 @@ def render(
     isolate: bool | None = None,
     **options: Unpack[RenderKeywords],
 ) -> Picture:
-    """Renders a stage, from a file or open, or a scene of ``SceneBuilder``.
+    """Renders a stage, given as a file or an open ``Usd.Stage``, or a scene from ``SceneBuilder``.
 
     Args:
         source: A path, a ``Usd.Stage``, a result of ``load``, or a ``Scene``.
-        size: Width and height in pixels; by default those of a path's render settings, else 600 x
-            600.
-        spp: Samples per pixel; with ``adaptive`` or ``noise`` the maximum.
+        size: Width and height in pixels; by default those in the render settings of a stage that
+            this function loads, else 600 x 600.
+        spp: Samples per pixel; with ``adaptive`` or ``noise``, the maximum number.
         progress: Called as progress(samples_done, samples_total) about ten times per second; return
             False to stop and keep the finished samples. In a notebook, None shows a bar and the
             current image; False shows nothing, and True shows a bar on a terminal as well.
@@ -135,18 +136,18 @@ def render(
         costs: "auto", "measured", "model", or the ``Picture.costs`` of another render as initial
             values.
         aovs: Layers besides beauty: names of docs/aovs.md, "light_NAME" for a light group,
-            "lpe:NAME=EXPRESSION", "crypto", "all"; by default a path's render vars, else albedo,
-            normal and depth.
+            "lpe:NAME=EXPRESSION", "crypto", "all"; by default the render vars of a stage that this
+            function loads, else albedo, normal and depth.
         checkpoint: File for the state of the render, written at intervals and at the end.
         every: Seconds between checkpoints.
         resume: Checkpoint to continue, from a render with the same stage and settings. The image is
             bit-identical to that of an uninterrupted render.
-        learn_from: With ``guiding``: a picture, or a file of its ``save_learned``, whose guiding
-            field this render uses. With a given guiding field no training takes place.
+        learn_from: With ``guiding``, a ``Picture``, or a file from ``Picture.save_learned``, whose
+            guiding field this render uses without further training.
         isolate: Deprecated and without effect, as in ``load``.
         **options: Fields of ``wavecomb.Settings``: max_depth, integrator, threads, seed, adaptive,
-            noise, min_spp, time_limit ...; for a path also those of ``LoadOptions``: camera, frame,
-            subdivision ...
+            noise, min_spp, time_limit ...; for a stage that this function loads, also fields of
+            ``LoadOptions``: camera, frame, subdivision ...
 
     >>> picture = wavecomb.render("mixed.usdc", size=(960, 540), spp=16)  # doctest: +SKIP
     >>> picture.beauty.shape  # doctest: +SKIP
@@ -227,7 +228,7 @@ def picture_from(
 
 
 def is_unread(source: Any) -> TypeGuard[str | os.PathLike[str] | Usd.Stage]:
-    """Returns whether a source is a path or an open stage, not a scene."""
+    """Returns whether a source is a path or an open ``Usd.Stage``, and not a scene."""
     return not (hasattr(source, "scene") or hasattr(source, "instanced_triangles"))
 
 
@@ -238,7 +239,10 @@ def _asked_for(
     settings: dict[str, Any],
     loading: Mapping[str, Any],
 ) -> tuple[tuple[int, int], Iterable[str] | None]:
-    """Returns the image size and AOVs, by default the first render product's; may set region."""
+    """Returns the image size and AOVs, by default those of the first render product.
+
+    Also sets ``region`` in ``settings`` if the render product restricts the pixels to render.
+    """
     names = ("render_settings", "product", "session_layer")
     asked = {name: loading[name] for name in names if loading.get(name) is not None}
     import_usd()
@@ -310,7 +314,7 @@ def _render(
 ) -> tuple[Result, bool]:
     """Renders a scene; also returns whether acceleration structures were built.
 
-    ``again`` is a loaded stage that keeps its renderer. ``named`` are arguments of
+    ``again`` is a loaded stage whose renderer is reused, or None. ``named`` are arguments of
     ``_core.render``.
     """
     from wavecomb import _core

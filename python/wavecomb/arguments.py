@@ -32,7 +32,7 @@ _OTHER_NAMES = {
     "stats": "statistics",
     "quiet": "silent",
 }
-"""For each option, the names that other renderers and tools use for it."""
+"""For each option, the names of the same option in other renderers and tools."""
 
 SYNONYMS = {word: name for name, words in _OTHER_NAMES.items() for word in words.split()}
 """Maps names from other renderers to options of Wavecomb, with "_" for hyphens."""
@@ -51,14 +51,14 @@ _ELSEWHERE = ("width", "height", "spp", "policy", "costs", "size")
 
 
 def keywords() -> set[str]:
-    """Returns the names of ``RenderKeywords`` (keywords.pyi), made from the same tables."""
+    """Returns the names in ``RenderKeywords`` (keywords.pyi), from the tables that define them."""
     from wavecomb.options import settings
 
     return {*settings(), *(one.name for one in fields(LoadOptions)), "region"} - {*_ELSEWHERE}
 
 
 def check_source(source: Any, *, also: Iterable[str] = ()) -> None:
-    """Raises ArgumentError unless a source is a path, a stage, or has an attribute of ``also``."""
+    """Raises ArgumentError unless a source is a path or stage, or has an attribute in ``also``."""
     if isinstance(source, (str, os.PathLike)) or hasattr(source, "GetRootLayer"):
         return
     if not any(hasattr(source, name) for name in also):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Renders .blend files: Blender, as a separate process, exports a stage.
+"""Renders .blend files, which Blender exports as a stage in a separate process.
 
-The translation is the Blender extension in ``blender/`` of a checkout, which has another licence
+The export is done by the Blender extension in ``blender/`` of a checkout, which has another licence
 and is not part of this package.
 """
 
@@ -49,18 +49,18 @@ runpy.run_path(sys.argv[1], run_name="__main__")
 
 
 def command(script: str, *words: str) -> list[str]:
-    """Returns the command that runs a script in Blender with scripts of files disabled.
+    """Returns the command that runs a script in Blender while scripts in .blend files are disabled.
 
     The process is isolated by ``wavecomb.processes``. The program is ``$WAVECOMB_BLENDER``, which
-    names Blender or a Python with the module bpy. Without this variable it is ``blender`` on PATH,
-    or else this Python if it has bpy.
+    is the path of Blender or of a Python interpreter with the module bpy. Without this variable,
+    the program is ``blender`` on PATH, or else the running Python interpreter if it has bpy.
 
     Args:
         script: Absolute path of the script.
         *words: Arguments of the script.
 
     Raises:
-        WavecombError: No Blender and no Python with bpy was found.
+        WavecombError: Neither Blender nor a Python interpreter with bpy was found.
     """
     named = os.environ.get("WAVECOMB_BLENDER")
     found = shutil.which(named or "blender")
@@ -142,7 +142,7 @@ def render(blend: str, frame: float | None, arguments: Sequence[str]) -> int:
     """Runs ``wavecomb render`` on the exported stage of a file; returns its exit code.
 
     Args:
-        blend: The file, one of ``arguments``.
+        blend: The .blend file, which is also one of ``arguments``.
         frame: Frame to export; None means the current one of the file.
         arguments: Arguments of the command.
 

@@ -35,11 +35,11 @@ _PR_SET_PDEATHSIG = 1
 def end_with_parent(parent: int) -> None:
     """Makes the kernel kill this process when its parent ends (on Linux only).
 
-    The kernel ends this process as soon as the thread of the parent that started it ends.
+    The kernel kills this process as soon as the thread that started it ends.
 
     Args:
         parent: Process that started this one. If the parent has already ended, this process ends as
-            well. 0 means the current parent, without this check.
+            well. 0 means the current parent and skips this check.
     """
     if not sys.platform.startswith("linux"):
         return
@@ -52,7 +52,7 @@ def end_with_parent(parent: int) -> None:
 
 
 def extended(path: Iterable[str], first: Iterable[str], last: Iterable[str]) -> list[str]:
-    """Returns ``sys.path`` extended by folders, without relative ones and the working folder.
+    """Returns an absolute ``sys.path`` with added folders other than the working folder.
 
     Args:
         path: An isolated ``sys.path``: the standard library and site-packages.
@@ -75,7 +75,7 @@ def extended(path: Iterable[str], first: Iterable[str], last: Iterable[str]) -> 
 
 
 class PackageFinder:
-    """Import finder for the ``wavecomb`` package that contains this file, and for nothing else."""
+    """Import finder that finds only the ``wavecomb`` package that contains this file."""
 
     def find_spec(self, name: str, path: Any, target: ModuleType | None = None) -> Any:
         """Finds a module; part of the interface of ``sys.meta_path``."""

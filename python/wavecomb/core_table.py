@@ -86,7 +86,8 @@ class Program:
         name: Name for ``add_material``.
         inputs: Parameters that textures can drive, by their names in ``add_material``.
         reads_ior: Whether the program uses the index of refraction.
-        has_more: Whether the program has parameters that UsdPreviewSurface lacks, as openpbr has.
+        has_more: Whether the program has parameters that UsdPreviewSurface lacks (true for
+            openpbr).
     """
 
     name: str
@@ -169,7 +170,7 @@ class LightParameter:
         default: Default value; None for ids.
         least: Smallest number; None means no limit.
         most: Largest number; None means no limit.
-        usual: Upper end of the slider in the window, for parameters without a largest number.
+        usual: Upper end of the slider in the window, for parameters without an upper limit.
         choices: Allowed values of a parameter of kind "choice".
         kinds: Kinds of light that have the parameter.
     """

@@ -39,7 +39,7 @@ class Check:
 def examine() -> dict[str, list[Check]]:
     """Runs all checks; returns results by heading. Takes about a second.
 
-    Broken libraries are reported and never raise exceptions.
+    Broken libraries are reported in the results and never raise exceptions.
     """
     return {
         "Wavecomb": [_package(), _try("native library", _native), _try("a picture", _picture)],
@@ -59,7 +59,7 @@ def examine() -> dict[str, list[Check]]:
 
 
 def is_fit(found: dict[str, list[Check]]) -> bool:
-    """Returns whether all parts that renders need work."""
+    """Returns whether all parts that are needed for rendering are in the state "ok"."""
     return all(one.state == OK or not one.needed for group in found.values() for one in group)
 
 
@@ -101,7 +101,7 @@ def _why(error: Exception) -> str:
 
 
 def _rebuild() -> str:
-    """Returns how to rebuild the native part, for a source tree or an installed wheel."""
+    """Returns how to rebuild the native part of a source tree or of an installed wheel."""
     is_source = (Path(__file__).resolve().parents[2] / "CMakeLists.txt").is_file()
     return (
         "make build"

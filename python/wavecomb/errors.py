@@ -34,7 +34,7 @@ class ArgumentError(WavecombError, TypeError):
 
 
 class SceneError(WavecombError, ValueError):
-    """Error about an invalid option or imported file of a generated stage."""
+    """Error for a generated stage: an option or an imported file is invalid."""
 
 
 def join_core(core: Any) -> None:

@@ -55,7 +55,7 @@ def install_command(extra: str) -> str:
 
 
 def requirements(extra: str) -> list[str]:
-    """Returns the packages of an extra with version bounds, from the installed metadata."""
+    """Returns the packages of an extra and their version bounds, from the installed metadata."""
     try:
         lines = importlib.metadata.requires("wavecomb") or []
     except importlib.metadata.PackageNotFoundError:
@@ -69,7 +69,7 @@ def requirements(extra: str) -> list[str]:
 
 
 def _is_for_this_python(marker: str) -> bool:
-    """Returns whether this Python satisfies the python_version bounds of a package marker."""
+    """Returns whether this Python version is within the python_version bounds of a marker."""
     bounds = re.findall(r"""python_version (<|>=) ['"](\d+)\.(\d+)['"]""", marker)
     now = sys.version_info[:2]
     return all((now < (int(a), int(b))) == (sign == "<") for sign, a, b in bounds)

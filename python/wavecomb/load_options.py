@@ -113,19 +113,19 @@ class LoadOptions:
         camera: Path or unique name of a camera prim. None uses the camera of the render settings,
             else the first camera of the stage, else a camera that frames the whole scene.
         frame: Time code. None means the stage's start time code, or default values if it has none.
-        purposes: Purposes of the geometry: "default", "render", "proxy", "guide". None uses those
-            of the render settings, else "default" and "render".
+        purposes: Purposes of the geometry: "default", "render", "proxy", "guide". None uses the
+            purposes in the render settings, else "default" and "render".
         variants: Selected variants, such as {"/World/Car{paint}": "red"}. A key without a path
             means the default prim.
         mask: Paths or patterns (docs/stages.md) of the prims to render, with their descendants and
             everything they need. The default is all prims.
         payloads: Patterns of prims whose payloads are loaded, or only "none". All by default.
-        holdouts: Prims that, with descendants, cut black holes with alpha 0 into the image.
-        catchers: Prims that, with descendants, show only shadows on them (docs/visibility.md).
-        catch: Purpose of the load for a stage with shadow catchers. "through" is the main render,
+        holdouts: Prims that, with their descendants, cut black holes with alpha 0 into the image.
+        catchers: Prims that, with descendants, show only received shadows (docs/visibility.md).
+        catch: Kind of render, for a stage with shadow catchers. "through" is the main render,
             in which the camera does not see catchers. "lit" and "bare" are the renders of catchers
             with and without other objects.
-        session_layer: Layer file whose opinions are stronger than those of the stage.
+        session_layer: Layer file whose opinions are stronger than the stage's opinions.
         subdivision: "off", a level from 0 to 10 for all subdivision surfaces, or "auto" to choose
             levels by the size of edges in the image (docs/subdivision.md).
         strand_pixels: Width in pixels below which curves are thinned out and the remaining curves
@@ -169,7 +169,7 @@ class LoadOptions:
         unset="the stage's start",
     )
     purposes: tuple[str, ...] | None = _row(
-        None, "Purpose of geometry to render (repeatable).", "choice", "--purpose", many=True,
+        None, "USD purpose of geometry to render (repeatable).", "choice", "--purpose", many=True,
         choices=PURPOSES, unset="of the render settings, else default and render",
     )  # fmt: skip
     variants: Mapping[str, str] | None = _row(
@@ -194,13 +194,13 @@ class LoadOptions:
     )  # fmt: skip
     render_settings: str | None = _row(
         None,
-        "Render settings prim of the stage to use, by path or name.",
+        "Render settings prim to use, by path or name.",
         "text", "--render-settings", metavar="PATH",
         unset="the stage's, else the only ones under /Render",
     )  # fmt: skip
     product: str | None = _row(
         None,
-        "Render product of the stage to render, by path or name.",
+        "Render product prim to render, by path or name.",
         "text", "--product", metavar="PATH",
         unset="all for render, else the first",
     )  # fmt: skip
@@ -231,7 +231,7 @@ class LoadOptions:
     )
     mask: tuple[str, ...] = _row(
         (),
-        "Prim or pattern to render, with descendants and everything that they need (repeatable).",
+        "Prim or path pattern to render, with descendants and all dependencies (repeatable).",
         "text", "--mask", many=True, metavar="PATH", unset="all",
     )  # fmt: skip
     payloads: tuple[str, ...] = _row(
@@ -239,28 +239,29 @@ class LoadOptions:
         "--payloads", many=True, metavar="PATTERN", unset="all",
     )  # fmt: skip
     holdouts: tuple[str, ...] = _row(
-        (), "Prim that, with its descendants, cuts a black hole of alpha 0 into the image "
+        (), "Prim whose subtree is a holdout, which renders as black with alpha 0 "
         "(repeatable).", "text", "--holdout", many=True, metavar="PATH", unset="as the stage says",
     )  # fmt: skip
     catchers: tuple[str, ...] = _row(
-        (), "Prim that, with its descendants, shows only the shadows it receives, as alpha "
+        (), "Prim whose subtree is a shadow catcher, which renders only received shadows, as alpha "
         "(repeatable).", "text", "--catcher", many=True, metavar="PATH", unset="as the stage says",
     )  # fmt: skip
     catch: str = _row(
         "through",
-        "Render of a stage with shadow catchers: image, or catchers with or without other objects.",
+        "Step of rendering shadow catchers: image without catchers, catchers with other objects, "
+        "or catchers alone.",
         "choice",
         choices=CATCH,
     )
     session_layer: str | None = _row(
         None,
-        "Layer whose opinions are stronger than those of the stage.",
+        "USD layer whose opinions override the stage.",
         "file", "--session-layer",
         metavar="FILE",
     )  # fmt: skip
     texture_limit: float | None = _row(
         None,
-        "Memory limit of textures and volume grids; textures beyond the limit move to a temporary "
+        "Memory limit of textures and volume grids; above it, textures are read from a temporary "
         "file.",
         "number",
         "--texture-limit", metavar="MB", least=0, above=True, unit="MB", unset="any",
@@ -273,26 +274,26 @@ class LoadOptions:
     )  # fmt: skip
     subdivision: str | int = _row(
         "auto",
-        "Refinement of subdivision surfaces: off, LEVEL times (0 to 10), or auto, by their size "
-        "in the image.",
+        "Refinement of subdivision surfaces: off, a level from 0 to 10, or auto to choose levels "
+        "by size in the image.",
         "text", "--subdivision", metavar="off|LEVEL|auto", unset="auto",
     )  # fmt: skip
     strand_pixels: float = _row(
         0.0,
-        "Width in pixels below which some curves are dropped and the others widened; 0 keeps all "
-        "curves.",
+        "Width in pixels below which curves are randomly removed and the remaining curves widened; "
+        "0 keeps all curves.",
         "number", "--strand-pixels", metavar="X", least=0, unset="0",
     )  # fmt: skip
     size: tuple[int, int] = _row(
         (600, 600), "Width and height of the image in pixels.", "pair", least=1
     )
     threads: int = _row(
-        0, "Number of threads for reading the stage; 0 means all.", "integer", least=0
+        0, "Number of threads for reading the stage; 0 uses all cores.", "integer", least=0
     )
 
     @classmethod
     def of(cls, options: LoadOptions | None, changes: Mapping[str, Any]) -> LoadOptions:
-        """Returns a copy with some values replaced, converted from the types of callers.
+        """Returns a copy with some values replaced; values may have all types that callers use.
 
         Raises:
             TypeError: There is no option of that name.

@@ -73,8 +73,8 @@ def tone_map(view: str, display: str | None = None) -> str:
     """Returns the value of ``tone_map`` in ``wavecomb.Picture.save`` that applies a view.
 
     Args:
-        view: Name of a view; upper and lower case are equal.
-        display: Name of a display; upper and lower case are equal. None means an sRGB screen.
+        view: Name of a view, in upper or lower case.
+        display: Name of a display, in upper or lower case. None means an sRGB screen.
 
     Raises:
         WavecombError: $OCIO cannot be used, or its configuration has no such view or display.
@@ -101,7 +101,7 @@ def mapped(rgb: NDArray[Any], tone_map: str) -> NDArray[np.uint8]:
 
 
 def problem() -> str | None:
-    """Returns why $OCIO cannot be used, or None if there is no problem."""
+    """Returns the reason why $OCIO cannot be used, or None if it can be used."""
     if os.environ.get("OCIO") and _current() is None:
         return (
             f"$OCIO {os.environ['OCIO']}: cannot be read, or has no linear Rec.709 colour space; "

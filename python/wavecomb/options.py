@@ -30,8 +30,8 @@ class Setting:
         zero: Meaning of the value 0, if this value has a special meaning.
         steps: Valid numbers in addition to 0; empty means that all numbers in the range are valid.
         choices: For a setting of kind "choice", the effect of each value.
-        group: "picture" (what the image shows), "work" (how much is computed) or "order" (in which
-            order).
+        group: "picture" (content of the image), "work" (amount of computation) or "order" (order of
+            computation).
         changes_picture: Whether the image depends on the setting.
         changes_bits: Whether the setting affects the bits of the beauty image at equal sample
             counts. With cost-aware roulette, the bits of the image also depend on measured shading

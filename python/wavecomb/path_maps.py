@@ -49,7 +49,7 @@ def own_maps() -> list[Pair]:
 
 
 def here(pairs: Iterable[Pair]) -> list[Pair]:
-    """Returns this process's maps, and those of a job whose FROM folder does not exist."""
+    """Returns this process's maps, and the job's maps whose FROM folders do not exist here."""
     found = own_maps()
     return found + [p for p in pairs if p not in found and not os.path.exists(p[0])]
 

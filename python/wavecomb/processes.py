@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Starts Python processes. No other module starts a Python process.
 
-If Python is started with ``-c`` or ``-m``, the working folder is on its ``sys.path``. Python would
-then import a file such as ``json.py`` next to a shot. This module therefore starts isolated
-processes (``python -I``). ``wavecomb.boot`` builds the ``sys.path`` of such a process from the
-standard library, site-packages, and the result of ``folders``. The new process inherits only the
-given file descriptors, has a separate process group, and ends with the process that started it.
+A Python process that is started with ``-c`` or ``-m`` has the working folder on its ``sys.path``.
+Python would then import a file such as ``json.py`` next to a shot. This module therefore starts
+isolated processes (``python -I``). ``wavecomb.boot`` builds the ``sys.path`` of such a process from
+the standard library, site-packages, and the result of ``folders``. The new process inherits only
+the given file descriptors, has a separate process group, and ends with the process that started it.
 """
 
 from __future__ import annotations
@@ -98,8 +98,8 @@ def command(
     Args:
         target: Name of the module, or "-c" to run code, which is then the first argument.
         arguments: Command-line arguments of the module.
-        parent: Id of the process with which the new process ends, and whose process group it
-            leaves. 0 means the process that starts it. None lets the new process run independently,
+        parent: Id of a process. The new process ends with that process, but leaves that process's
+            group. 0 means the process that starts it. None lets the new process run independently,
             for example on another machine.
         keep: File descriptors that the process inherits in addition to the standard streams.
         path: Absolute folders of Wavecomb that are added to the ``sys.path`` of the process.
@@ -157,8 +157,8 @@ except OSError as error:
 def program(*words: str) -> list[str]:
     """Returns the command that runs another program as ``command`` runs a module.
 
-    The program replaces an isolated Python, which has closed inherited descriptors, created a
-    process group, and made the process end with this one.
+    An isolated Python process closes inherited descriptors, creates a process group, arranges to
+    end with this process, and is then replaced by the program.
 
     Args:
         *words: Absolute path of the program, and its arguments.
@@ -172,9 +172,9 @@ def program(*words: str) -> list[str]:
 def popen(words: Sequence[str], **options: Any) -> subprocess.Popen[Any]:
     """Starts a command line from ``command`` in a new session, from a thread that never ends.
 
-    The kernel ends a process not only with its parent process, but already with the thread that
-    started it. Threads other than the main thread therefore pass the start to a thread that never
-    ends.
+    The kernel ends such a process as soon as the thread that started it ends, even if the parent
+    process continues. Threads other than the main thread therefore pass the start to a thread that
+    never ends.
     """
     options = {"start_new_session": True, **options}
     if threading.current_thread() is threading.main_thread():

@@ -119,9 +119,9 @@ class Renderer:
         Args:
             camera: Arguments of ``SceneBuilder.set_camera``: ``transform``, ``window``,
                 ``lens_radius`` ...
-            materials: By name or id of a material, new values for arguments of
+            materials: Maps the name or id of a material to new values for arguments of
                 ``SceneBuilder.add_material``. Program, name and textures cannot change.
-            lights: By name or id of a light, new values for arguments of
+            lights: Maps the name or id of a light to new values for arguments of
                 ``SceneBuilder.add_light``, such as ``transform`` (object to world), ``color`` and
                 ``radius``. Kind, name, texture and group cannot change.
             moves: World space transforms by prim path. A transform moves all objects and lights at

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 COLUMNS = ("throughput", "position_key", "texture_key")
-"""Optional columns of a queue of hits, which are computed only for policies that list them."""
+"""Optional columns of a queue of hits; they are computed only for policies that list them."""
 
 
 class SchedulingPolicy:
@@ -59,7 +59,7 @@ class SchedulingPolicy:
             keys: (records,) array of zeros that this method overwrites.
 
         Returns:
-            False keeps the order of arrival without sorting; None or True sorts by the keys.
+            False to keep the order of arrival without sorting; None or True to sort by the keys.
         """
         raise NotImplementedError
 

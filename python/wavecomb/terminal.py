@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Standard output and error of commands; ``Stream`` cleans all text for a terminal.
 
-Commands print each message with ``say`` or with a string for ``console``. Both escape newlines as
-well, so that a name or a path that contains a newline cannot forge a line. Only help, JSON and the
+Commands print each message with ``say`` or with a string for ``console``. Both also escape
+newlines, so that a newline in a name or path cannot forge a line of output. Only help, JSON and the
 code for completion are printed as several lines at once.
 
 Names of prims and files and messages of libraries may contain control characters, which would move
@@ -74,7 +74,7 @@ def _escape(match: re.Match[str]) -> str:
 
 
 class _Raw(io.FileIO):
-    """A file descriptor wrapped so that writing never raises an exception.
+    """Wrapper of a file descriptor that never raises an exception when writing.
 
     Attributes:
         error: The first error that occurred while writing.
@@ -150,7 +150,7 @@ _NAMES = ("stdout", "stderr")
 def guard_streams() -> None:
     """Replaces standard output and error by ``Stream`` objects, and opens closed descriptors.
 
-    If descriptor 0, 1 or 2 were closed, the next opened file would get its number and receive
+    If descriptor 0, 1 or 2 were closed, the next opened file would get its number and thus receive
     messages. Streams that a program or a test has already replaced stay unchanged.
     """
     for number in range(3):
@@ -177,11 +177,11 @@ def guard_streams() -> None:
 
 
 _replaced: list[Any] = []
-"""The replaced streams, kept alive since closing them may close their descriptors."""
+"""The replaced streams, which stay referenced, since closing them may close their descriptors."""
 
 
 def flush_streams() -> OSError | None:
-    """Flushes standard output and error; returns the error by which standard output lost text."""
+    """Flushes standard output and error; returns the error that made standard output lose text."""
     for stream in (sys.stdout, sys.stderr):
         if stream is not None:
             with contextlib.suppress(OSError, ValueError):

@@ -108,7 +108,7 @@ class Bricks:
         origins: (n, 3) int32, index of the first voxel of each brick.
         values: (n, 8, 8, 8) or (n, 8, 8, 8, 3), float16 or float32, with x slowest.
         index_to_object: Transform (4, 4) as in ``GridInfo``. The attributes background, kind,
-            voxels and box are also those of ``GridInfo``.
+            voxels and box have the same meaning as in ``GridInfo``.
         not_finite: Number of infinite and NaN values.
         negative: Number of negative values.
         least: Smallest value, at most 0.
@@ -196,7 +196,7 @@ def read(
         whole: Whether to include bricks that contain only zeros.
 
     Raises:
-        WavecombError: The file is corrupt, or the grid is too large or of an unsupported type.
+        WavecombError: The file is corrupt, or the grid is too large or has an unsupported type.
     """
     plugin = _needed(path)
     with _errors(plugin, path, head.name):

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 LOADING = ("camera", "frame", "variants", "purposes")
 SETTINGS = ("max_depth", "seed", "threads", "policy", "ray_order", "roulette")
-"""Settings that the window accepts when it is opened; all others are chosen in the window."""
+"""Settings that the window accepts when it is opened; the user chooses all others in the window."""
 
 
 class Window:

@@ -42,7 +42,7 @@ def _ball(spp: int = 16) -> Any:
 
 
 def same(folder: Path) -> None:
-    """Renders by F12, then renders the exported stage by the command line."""
+    """Renders with F12, then renders the exported stage on the command line."""
     scene, _ = _ball()
     engine = _engine()
     kept: dict[str, Any] = {}

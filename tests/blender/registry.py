@@ -15,7 +15,7 @@ class Expected:
         low: Lowest ratio of the means, Wavecomb to Cycles.
         high: Highest ratio of the means.
         outside: Largest fraction of blocks that differ by more than 2 % and four standard errors.
-        why: Reason for a difference; empty where the models are the same.
+        why: Reason for a difference; empty if both renderers have the same model.
     """
 
     low: float = 0.99

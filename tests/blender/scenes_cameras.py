@@ -128,7 +128,7 @@ def motion_object() -> None:
 
 @scene("Motion", spp=256)
 def motion_turn() -> None:
-    """A turning cube, its shutter at the start of the frame."""
+    """A turning cube, with a shutter that opens at the start of the frame."""
     studio()
     _moved(cube(principled(base_color=(0.3, 0.3, 0.7))), "rotation_euler", (0, 0, 0), (0, 0, 1.2))
     _blurred(0.8)

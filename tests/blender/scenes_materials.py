@@ -189,7 +189,7 @@ def principled_subsurface_deep() -> None:
 
 @scene("Principled", outside=0.1, why=BOUNDARY, spp=256)
 def principled_subsurface_skin() -> None:
-    """Subsurface scattering by the method for skin."""
+    """Subsurface scattering with the method that is meant for skin."""
     material = _ball(
         base_color=(0.8, 0.5, 0.4), subsurface_weight=1.0, subsurface_scale=0.1,
         subsurface_radius=(1.0, 0.5, 0.25), roughness=0.6,
@@ -274,7 +274,7 @@ def _mixture(first: str, second: str, factor: float, a: Any = None, b: Any = Non
 
 @scene("Shaders")
 def mix_diffuse_glossy() -> None:
-    """Mix of a diffuse and a glossy shader with their own colours."""
+    """Mix of a diffuse and a glossy shader with different colours."""
     _mixture(
         "ShaderNodeBsdfDiffuse", "ShaderNodeBsdfAnisotropic", 0.4,
         {"Color": (0.2, 0.5, 0.7)}, {"Color": (0.8, 0.8, 0.8), "Roughness": 0.2},

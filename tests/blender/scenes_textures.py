@@ -259,7 +259,7 @@ def baked_two_objects() -> None:
 
 @scene("Baked")
 def baked_bump() -> None:
-    """A bump by a noise texture."""
+    """A bump map from a noise texture."""
     studio()
     material = principled(base_color=(0.6, 0.6, 0.6), roughness=0.5)
     material.cycles.use_bump_map_correction = False
@@ -309,7 +309,7 @@ def baked_group() -> None:
 
 @scene("Baked")
 def baked_group_alone() -> None:
-    """A noise in a node group, without nodes after it."""
+    """A noise in a node group, whose output is used directly."""
     studio()
     material = principled(roughness=1.0, specular_ior_level=0.0)
     group = bpy.data.node_groups.new("spots", "ShaderNodeTree")

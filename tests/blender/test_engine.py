@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The Blender render engine: images, errors, cancelling, animation, and .blend files."""
+"""Tests the Blender render engine: images, errors, cancelling, animation and .blend files."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def _rows(done: subprocess.CompletedProcess[str]) -> dict[str, object]:
 
 
 def test_command_line_writes_the_same_image(blender: Run, tmp_path: Path) -> None:
-    """A render by F12 and ``wavecomb render`` on the exported stage give the same values."""
+    """A render with F12 and ``wavecomb render`` of the exported stage give the same values."""
     row = _rows(blender(str(HERE / "engine_cases.py"), "same", str(tmp_path)))
     assert row["same"] is True
 
@@ -62,7 +62,7 @@ def test_report_lists_what_is_missing(blender: Run, tmp_path: Path) -> None:
 
 
 def test_cryptomatte_has_the_ids_of_cycles(blender: Run, tmp_path: Path) -> None:
-    """Cryptomatte ids of the first rank equal those of Cycles and cover as many pixels."""
+    """Cryptomatte ids of the first rank equal Cycles' ids and cover the same number of pixels."""
     row = _rows(blender(str(HERE / "engine_cases.py"), "cryptomatte", str(tmp_path)))
     passes = row["passes"]
     assert isinstance(passes, dict) and len(passes) == 6

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The wheel in a root file system with only Python, glibc and libstdc++.
+"""Tests the wheel in a root file system with only Python, glibc and libstdc++.
 
 The root has no compiler, shell, pip or network. The wheel installs from a folder of wheels. Each of
-its libraries renders the same images inside the root as outside, also with another Python version.
-`make test-wheel` runs this; it needs `apt-get`.
+its libraries renders the same images inside the root as outside, even with a different Python
+version. `make test-wheel` runs this; it needs `apt-get`.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ def collect(python: str, folder: Path) -> None:
 
 
 def runnable() -> list[str]:
-    """The libraries that this CPU can run; "" for a wheel with one library."""
+    """Names of the libraries that this CPU can run; "" if the wheel has only one library."""
     built = isa.libraries(wavecomb.__path__)
     if not built:
         return [""]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The source distribution of `make sdist` builds in a separate folder.
+"""Tests that the source distribution of `make sdist` builds in a separate folder.
 
 The installed package renders the same image as this build. `make test-sdist` runs this.
 """

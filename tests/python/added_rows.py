@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Adds rows to parameter tables, for tests that every consumer of a table picks up new rows."""
+"""Adds rows to parameter tables, to test that every user of a table picks up new rows."""
 
 from __future__ import annotations
 

@@ -226,7 +226,10 @@ def has_picture(row: Mapping[str, Any]) -> bool:
 
 
 def statistics(rng: np.random.Generator) -> dict[str, Any]:
-    """Returns costs of twelve materials. The measured cost is 5 + 1.1 x calibrated, with noise."""
+    """Returns costs of twelve materials.
+
+    The measured cost is 5 + 1.1 times the calibrated cost, with noise.
+    """
     materials = []
     for k in range(12):
         calibrated = 40.0 + 15.0 * k
@@ -246,7 +249,10 @@ def statistics(rng: np.random.Generator) -> dict[str, Any]:
 
 
 def write_pictures(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Writes golden images and noisy ones. All policies but cost-benefit have the same noise."""
+    """Writes golden images, and noisy versions of them.
+
+    All policies but cost-benefit have the same noise.
+    """
     rng = np.random.default_rng(6)
     y, x = np.mgrid[0:48, 0:64] / 48.0
     golden = np.stack([0.2 + 0.5 * x / 1.3, 0.3 + 0.4 * y, 0.5 - 0.2 * x * y], axis=2)

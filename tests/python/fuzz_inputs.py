@@ -3,7 +3,7 @@
 
 The inputs are IES profiles, MaterialX, meshes, files that renders write, and names of image files.
 Each case is made from a valid file by the mutations of ``fuzz_cases``. ``fuzz_worker`` and the
-command decide by the file name how to read it.
+command choose the reader of a case by the file name.
 """
 
 from __future__ import annotations
@@ -242,7 +242,7 @@ def Material "Look" {
 
 @cache
 def vdb_bytes(name: str = "a.vdb", packed: str = "none", bits: str = "32") -> bytes:
-    """Returns two small grids, one of them with a tile."""
+    """Returns two small grids, one of which has a tile."""
     import numpy as np
 
     rng = np.random.default_rng(1)

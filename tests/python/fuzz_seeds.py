@@ -259,7 +259,7 @@ def Xform "Root" {
 """
 
 IMAGES = {"png": "uint8", "jpg": "uint8", "exr": "half", "hdr": "float"}
-"""Pixel type by file suffix."""
+"""Maps file suffixes to pixel types."""
 
 
 def stage_text(texture: str = "a.png", dome: str = "a.hdr") -> str:

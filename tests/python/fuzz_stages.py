@@ -56,7 +56,7 @@ class Verdict:
             line); wrong or hang, which are faults.
         said: Message of the loader, or description of the fault.
         seconds: Time of the worker or of the command.
-        death: How the worker ended, if it ended.
+        death: Reason why the worker ended, if it ended.
     """
 
     kind: str
@@ -76,7 +76,7 @@ class Watch:
     """Limit on the CPU time of a process and its children.
 
     Since the limit is on CPU time, a busy machine that halts processes for a while causes no false
-    hangs. A process that waits for ever is detected by a longer limit on wall-clock time.
+    hangs. A longer limit on wall-clock time detects a process that waits forever.
     """
 
     PATIENCE = 12
@@ -119,8 +119,8 @@ class Worker:
         self._process: subprocess.Popen[str] | None = None
 
     def judge(self, stage: Path) -> tuple[str, str, str]:
-        """Returns (outcome, message, end of the worker). The outcome is "died" or "hang" if the
-        worker does not answer.
+        """Returns (outcome, message, reason why the worker ended). The outcome is "died" or "hang"
+        if the worker does not answer.
         """
         process = self._started()
         assert process.stdin is not None
@@ -184,7 +184,7 @@ class Worker:
 
 
 PLACES = ("home", "work", "tmp")
-"""Folders that worker processes use in addition to those of the cases."""
+"""Folders that worker processes use in addition to the folders of the cases."""
 
 
 def environment(place: Path) -> dict[str, str]:
@@ -196,7 +196,7 @@ def environment(place: Path) -> dict[str, str]:
 
 
 def strays(place: Path, before: set[Path], case: Path) -> list[str]:
-    """Returns the new files in a folder, except those of the case."""
+    """Returns the new files in a folder, except the files of the case."""
     now = {path for path in place.rglob("*") if not path.is_relative_to(case)}
     return sorted(str(path) for path in now - before if "tmp" not in path.parts[-2:])
 

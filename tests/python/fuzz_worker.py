@@ -24,7 +24,7 @@ OUTCOMES = ("rendered", "warned", "refused", "wrong")
 
 
 def read(case: Path) -> tuple[str, str]:
-    """Reads an input that is not a stage, by the reader that its file name requires. Returns
+    """Reads an input that is not a stage, with the reader that matches its file name. Returns
     (outcome, message).
     """
     import wavecomb
@@ -113,8 +113,9 @@ def watch_writes(inside: str) -> list[str]:
 
 
 def give_up(answers: TextIO, line: str) -> NoReturn:
-    """Answers and ends the process. USD never finishes composing some stages, and nothing else
-    stops it.
+    """Answers and ends the process.
+
+    This is the only way to stop USD, which never finishes composing some stages.
     """
     answer = {"outcome": "refused", "said": line, "ended": True}
     print(json.dumps(answer), file=answers, flush=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Single MaterialX nodes on a stage in memory, compiled and run."""
+"""Compiles and evaluates single MaterialX nodes on a stage in memory."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ def points(n=200):
 
 @functools.cache
 def patterns():
-    """Returns the definitions of the library with numeric outputs, by name, with those outputs."""
+    """Returns the library's definitions that have numeric outputs, with these outputs, by name."""
     found = {}
     for definition in library().getNodeDefs():
         outputs = [o.getName() for o in definition.getActiveOutputs() if o.getType() in WIDTHS]

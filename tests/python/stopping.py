@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Renders that are stopped before their end."""
+"""Watchers that stop renders early."""
 
 from __future__ import annotations
 

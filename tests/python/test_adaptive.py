@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Adaptive and timed renders: exact sample counts, no excess samples, and time limits."""
+"""Tests adaptive and timed renders: exact sample counts, no excess samples, and time limits."""
 
 from __future__ import annotations
 
@@ -145,7 +145,7 @@ def test_time_limit(cornell: Any) -> None:
 
 
 def test_time_limit_with_little_time(cornell: Any) -> None:
-    """Even with too little time for one sample per pixel, each pixel has one."""
+    """Each pixel gets one sample even if the time limit is too short for one sample per pixel."""
     picture = render(cornell, size=128, time_limit=1e-4)
     assert (picture.samples == 1).all()
 

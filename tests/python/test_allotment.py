@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sample allocation: sample counts in all schedules, budget, resuming, refused settings."""
+"""Tests sample allocation: sample counts, schedules, budget, resuming, refused settings."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_too_few_samples_are_even(cornell: Any) -> None:
 
 @pytest.mark.slow
 def test_is_unbiased(cornell: Any) -> None:
-    """The mean of many low-sample images equals that of images with even sampling."""
+    """The mean of many images with few samples equals the mean of uniformly sampled images."""
 
     def means(way: str, first: int) -> Any:
         return np.array(

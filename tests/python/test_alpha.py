@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Images for compositing: a dome hidden from the camera, and an alpha channel in every file."""
+"""Tests images for compositing: a dome hidden from the camera, and alpha in every file."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""AOVs from stage to file: allowed names, values, layer names."""
+"""Tests AOVs from stage to file: allowed names, values and layer names."""
 
 from __future__ import annotations
 

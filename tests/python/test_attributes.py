@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Primvars that drive materials, in every interpolation."""
+"""Tests primvars that drive materials, in every interpolation."""
 
 from __future__ import annotations
 
@@ -108,7 +108,10 @@ def test_interpolation_is_numpys(tmp_path, kind, mirrored):
 
 
 def test_numbers_of_a_material_and_its_fallback(tmp_path):
-    """A primvar drives roughness. A mesh without the primvar uses the fallback of the reader."""
+    """A primvar drives roughness.
+
+    A mesh without the primvar uses the fallback value of the primvar reader.
+    """
     reader = READER.format(kind="float", name="rough", fallback="0.75")
     text = material("float inputs:roughness.connect = </Mat/P.outputs:result>", reader)
     values = np.linspace(0, 1, 9)[:, None]
@@ -132,7 +135,7 @@ def test_numbers_of_a_material_and_its_fallback(tmp_path):
 
 
 def test_nodes_of_networks_read_primvars(tmp_path):
-    """Constant geompropvalue nodes are folded; varying primvars and a second UV set are read."""
+    """Constant geompropvalue nodes are folded; varying primvars and the second UV set are not."""
     nodes = """def Shader "G" { uniform token info:id = "ND_geompropvalue_float"
             string inputs:geomprop = "wear"
             float inputs:default = 0.5
@@ -279,7 +282,7 @@ def lamp(tmp_path, n, kind):
 
 
 def test_emission_by_a_primvar_is_aimed_at(tmp_path):
-    """Emission that varies over two triangles lights the floor as many constant quads do."""
+    """Emission that varies over two triangles lights the floor like many quads of one colour."""
     ramp, steps = lamp(tmp_path, 1, "vertex"), lamp(tmp_path, 12, "uniform")
     assert ramp.min() > 0.005 and ramp[0, :, 0].mean() > 1.4 * ramp[-1, :, 0].mean()
     assert ramp == pytest.approx(steps, rel=0.12)

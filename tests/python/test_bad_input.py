@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Bad input causes one clear error line, without a traceback, crash or partial file."""
+"""Tests that bad input causes one clear error line, without traceback, crash or partial file."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Points that are not finite: faces that use them are left out with a warning."""
+"""Tests that faces that use points that are not finite are left out with a warning."""
 
 import numpy as np
 import pytest
@@ -45,7 +45,7 @@ def test_faces_that_use_a_bad_point_are_left_out(tmp_path, faces, lost, whole):
 
 
 def test_points_far_away_once_they_are_placed(tmp_path):
-    """Points that a transform moves too far away are left out, others stay."""
+    """Points that a transform moves too far away are left out; all other points are kept."""
     text = grid(3, 5).replace("nan", "1e17")
     order = 'uniform token[] xformOpOrder = ["xformOp:scale"]'
     scale = f"double3 xformOp:scale = (100, 100, 100)\n{order}"

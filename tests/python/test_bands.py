@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cropped images, and images rendered and written in bands of rows."""
+"""Tests cropped images, and images that are rendered and written in bands of rows."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def test_bands_are_the_whole_picture(stage: Path, tmp_path: Path, words: tuple[s
 
 @pytest.mark.slow
 def test_files_beside_it(stage: Path, whole: Path, tmp_path: Path) -> None:
-    """PNG, AOV files and statistics of a render in bands equal those of a render in one piece."""
+    """A render in bands has the PNG, AOV files and statistics of a render in one piece."""
     file, png, stats = (tmp_path / name for name in ("a.exr", "a.png", "a.json"))
     done = forks.wavecomb(
         "render", str(stage), "-o", str(file), "--png", str(png), "--stats", str(stats), *WORDS,
@@ -113,7 +113,7 @@ def test_a_cropped_picture_says_where_it_lies(stage: Path, whole: Path, tmp_path
 
 @pytest.mark.slow
 def test_a_cropped_picture_in_memory(stage: Path) -> None:
-    """Cropped renders in memory, also adaptive ones, equal the same part of a full-size image."""
+    """Cropped renders in memory, including adaptive ones, equal that part of a full-size image."""
     region = (30, 20, 110, 180)
     for more in ({}, {"noise": 0.2, "spp": 64}):
         options = {"size": SIZE, "spp": 4, "region": region, **more}
@@ -167,7 +167,7 @@ def grows(folder: Path) -> bool:
 @pytest.mark.slow
 @pytest.mark.parametrize("frames", [False, True])
 def test_a_stopped_picture(stage: Path, tmp_path: Path, frames: bool) -> None:
-    """A stopped single image gets empty rows; a stopped frame of a sequence is not written."""
+    """A stopped single image gets empty rows; a stopped sequence frame is not written."""
     file = tmp_path / ("a.1.exr" if frames else "a.exr")
     name = str(tmp_path / "a.#.exr") if frames else str(file)
     words = ["--frames", "1-2"] if frames else []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Suites, plan, runner and data of the benchmark."""
+"""Tests suites, plan, runner and data of the benchmark."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The analysis on generated runs with known answers."""
+"""Tests the benchmark analysis on generated runs with known answers."""
 
 from __future__ import annotations
 
@@ -174,7 +174,7 @@ def test_share_between_placebo_and_oracle(tmp_path: Path) -> None:
 
 
 def test_order_is_apart_from_roulette(tmp_path: Path) -> None:
-    """Roulette halves the work, which the analysis must not count as an effect of order."""
+    """Roulette halves the work, and the analysis must not attribute that to the shading order."""
     runs = results(
         tmp_path,
         runs_of(

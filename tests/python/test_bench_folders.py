@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`wavecomb bench compare`: two result folders with known ratios."""
+"""Tests `wavecomb bench compare` with two result folders that have known ratios."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Oracles of order: the best and the worst order of materials, found from measured runs."""
+"""Tests the oracles of the best and the worst order of materials, found from measured runs."""
 
 from __future__ import annotations
 
@@ -46,8 +46,10 @@ def of_program(order: list[str], names: dict[str, str], program: str) -> list[st
 
 @pytest.mark.parametrize("drift", [False, True])
 def test_best_order_is_found(drift: bool) -> None:
-    """A material costs half if it follows its alphabetical predecessor. The speed of the machine
-    may drift."""
+    """A material costs half as much if it follows its alphabetical predecessor.
+
+    The speed of the machine may drift.
+    """
     names = {"a": "p", "b": "p", "c": "p", "d": "p", "x": "q", "y": "q"}
 
     def cost(before: str, name: str) -> float:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The report and its figures, from generated results of every kind."""
+"""Tests the benchmark report and its figures with generated results of every kind."""
 
 from __future__ import annotations
 

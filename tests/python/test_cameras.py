@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""UsdGeomCamera, from the stage to the image."""
+"""Tests UsdGeomCamera from the stage to the image."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shadow catchers: their alpha against renders with and without the other objects."""
+"""Tests the alpha of shadow catchers against renders with and without the other objects."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tools/check_sizes finds files, functions and parameter lists that are too long."""
+"""Tests that tools/check_sizes finds files, functions and parameter lists that are too long."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_nothing_to_check_is_an_error(tmp_path: Path) -> None:
     ],
 )
 def test_long_functions(tmp_path: Path, head: str) -> None:
-    """Functions of 80 lines are allowed and of 81 lines are not, for every form of declaration."""
+    """Functions may have 80 lines but not 81, for every form of declaration."""
     before = head.splitlines()[:-1]
     outer = sum(line.endswith("{") for line in before)
     own = 0 if outer else len(before)
@@ -106,7 +106,7 @@ def test_types_with_commas_are_one_parameter(tmp_path: Path) -> None:
 
 
 def test_python(tmp_path: Path) -> None:
-    """Keyword-only parameters and self do not count, and functions may be long."""
+    """In Python, keyword-only parameters and self do not count, and functions may be long."""
     seven = "a, b, c, d, e, f, g"
     good = f"class A:\n    def f(self, {seven}, *, h, i):\n" + "        pass\n" * 90
     assert found(tmp_path, "python/a.py", good) == []

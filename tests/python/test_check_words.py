@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks of tools/check_words: what it finds, what it permits, and its speed."""
+"""Tests tools/check_words: prose that it rejects, prose that it permits, and its speed."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checkpoints: a render that was stopped in any way resumes with the same result."""
+"""Tests that a render that was stopped in any way resumes with the same result."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def test_snapshots_change_nothing(cornell: Any, spp: int) -> None:
 
 @pytest.mark.slow
 def test_a_limit_is_kept_by_a_render_that_had_none(cornell: Any) -> None:
-    """A render resumed with a time limit keeps to it within a pass of 2^14 samples."""
+    """A render resumed with a time limit observes it even within a pass of 2^14 samples."""
     settings = {"width": 64, "height": 64, "noise": 0.001, "min_spp": 1 << 14, "spp": 1 << 15,
                 "quality": "plain"}  # fmt: skip
     begun = StopAt(0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stages with caustics of water and glass: shapes, and positions of the focused light."""
+"""Tests stages with caustics of water and glass: shapes, and positions of focused light."""
 
 from __future__ import annotations
 

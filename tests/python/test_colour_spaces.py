@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Colour spaces of colours in networks, primvars, lights and MaterialX files."""
+"""Tests colour spaces of colours in networks, primvars, lights and MaterialX files."""
 
 import pytest
 from parts import needs
@@ -72,7 +72,7 @@ def test_colours_of_networks_are_read_in_their_spaces(tmp_path, stage):
 
 
 def test_layers_and_numbers_of_a_shader(tmp_path):
-    """Colours beside textures are converted, numbers and vectors are not."""
+    """Colours of a shader that also has textures are converted; numbers and vectors are not."""
     scene, _ = load(
         tmp_path,
         material(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compilation units that depend on each shading program, from the dependencies of the build."""
+"""Tests which compilation units depend on each shading program, by build dependencies."""
 
 from __future__ import annotations
 

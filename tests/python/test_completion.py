@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Command-line completion in real shells, and a first run without arguments."""
+"""Tests command-line completion in real shells, and a first run without arguments."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Texture inputs that are connected to nodes with one value per object, such as primvar readers."""
+"""Tests texture inputs that read one value per object, for example from primvar readers."""
 
 import numpy as np
 import OpenImageIO as oiio
@@ -185,7 +185,7 @@ def test_files_by_a_primvar_are_listed(tmp_path):
 
 @pytest.mark.parametrize(("fallback", "listed"), [("(0.25, 0.75)", True), ("(0, 0)", False)])
 def test_a_fallback_of_texture_coordinates_is_listed(tmp_path, fallback, listed):
-    """Meshes without the primvar use (0, 0) and not the fallback of the reader."""
+    """Meshes without the primvar use (0, 0), not the fallback value of the primvar reader."""
     oiio.ImageBuf(oiio.ImageSpec(2, 2, 3, "uint8")).write(str(tmp_path / "t.png"))
     varname = f'string inputs:varname = "st"\nfloat2 inputs:fallback = {fallback}'
     _, loaded = load(tmp_path, stage("", varname=varname))

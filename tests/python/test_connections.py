@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Connections of camera paths with light paths: schedules, crops, layers by technique."""
+"""Tests connections of camera and light paths: schedules, crops, layers by technique."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Contents of absorbing glass after edits, and absorption that a value graph drives."""
+"""Tests edits of absorbing glass with contents, and absorption that a value graph drives."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def scene(
 
     Args:
         tinted: Whether the glass absorbs.
-        stone: Whether the card is inside of the glass; otherwise it is beside it.
+        stone: Whether the card is inside the glass; otherwise the card is beside the glass.
         lamp: Position of the light.
         graph: Adds a graph to a builder and returns its number.
         layers: Layer parameters of OpenPBR for the glass.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A C++ program uses the installed core as the README describes: find, compile, run."""
+"""Tests that a C++ program can find, compile and run the installed core as in the README."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Deep images: they flatten to the beauty, and OpenImageIO reads their files."""
+"""Tests that deep images flatten to the beauty, and that OpenImageIO reads their files."""
 
 from __future__ import annotations
 
@@ -275,7 +275,7 @@ def test_what_cannot_be_is_refused(options: list[str], says: str, tmp_path: Path
 
 @pytest.mark.slow
 def test_it_goes_on_from_a_checkpoint(tmp_path: Path) -> None:
-    """Resuming with other threads and wave sizes gives the same bits as one run."""
+    """Resuming with other thread counts and wave sizes gives the same bits as one run."""
     scene = wavecomb.load(write(tmp_path, CAMERA + LIT + _hair())).scene
     settings: dict[str, Any] = {
         **{"width": 48, "height": 40, "spp": 400, "aovs": ["alpha", "deep"], "deep_samples": 5}

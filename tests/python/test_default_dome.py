@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stages without lights: a soft dome is added unless emissive meshes light visible objects."""
+"""Tests that stages get a soft dome unless lights or emissive meshes light their objects."""
 
 import numpy as np
 import OpenImageIO as oiio
@@ -94,7 +94,7 @@ def test_sizes_are_those_of_the_world(tmp_path):
 
 @pytest.mark.parametrize(("bright", "lit"), [(1.0, True), (0.001, False)])
 def test_emissive_textures_count_by_their_means(tmp_path, bright, lit):
-    """The mean of an emissive texture, which may be mostly black, decides whether it is a light."""
+    """An emissive texture, which may be mostly black, counts as a light by its mean."""
     side = 64
     pixels = np.zeros((side, side, 3), np.float32)
     pixels[: max(int(side * bright), 1), : max(int(side * bright), 1)] = 5.0

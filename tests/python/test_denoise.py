@@ -64,7 +64,7 @@ def test_guides_keep_detail(pictures: Any) -> None:
 
 
 def looking_at(program: str, z: float, wall_z: float, **material: Any) -> wavecomb.Picture:
-    """Renders a surface at z before a camera, and a wall of albedo (0.2, 0.6, 0.4) at `wall_z`."""
+    """Renders a surface at `z`, and a wall of albedo (0.2, 0.6, 0.4) at `wall_z` behind it."""
     builder = wavecomb.SceneBuilder()
 
     def add(at: float, faces_camera: bool, material: int) -> None:

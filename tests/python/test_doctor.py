@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`wavecomb doctor`: installed and missing parts, and the commands that install them."""
+"""Tests `wavecomb doctor`: installed and missing parts, and commands that install them."""
 
 from __future__ import annotations
 

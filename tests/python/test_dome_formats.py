@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Dome textures in formats other than latlong: directions of pixels, and irradiance."""
+"""Tests dome textures in formats other than latlong: pixel directions, and irradiance."""
 
 import numpy as np
 import OpenImageIO as oiio

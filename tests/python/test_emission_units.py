@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Units of emission in MaterialX's graphs and in UsdLux, where intensity 1 is 1 nit."""
+"""Tests units of emission in MaterialX's graphs and in UsdLux, where intensity 1 is 1 nit."""
 
 from __future__ import annotations
 
@@ -144,7 +144,7 @@ def test_distant_lights_are_divided_by_their_size_factor(
 def test_points_shine_as_far_spheres(
     tmp_path: Path, radius: float, point: bool, normalize: bool, expected: float
 ) -> None:
-    """treatAsPoint lets a sphere light be replaced by one of radius 0.
+    """treatAsPoint allows renderers to replace a sphere light by a sphere light of radius 0.
 
     The illuminance at distance d is pi r^2 / d^2 times the luminance. With inputs:normalize, which
     divides by 4 pi r^2, the irradiance is 1 / (4 d^2).

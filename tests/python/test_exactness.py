@@ -315,7 +315,7 @@ def test_scenes_have_something_to_order(scene: str, scene_of: Any) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("scene", SCENES)
 def test_coherence_is_of_all_depths(scene: str, scene_of: Any) -> None:
-    """Coherence is measured at all depths, so an additional depth hardly changes it."""
+    """Coherence is measured at all depths, so one more depth hardly changes the coherence."""
     settings: dict[str, Any] = {
         "policy": "material",
         "threads": 1,
@@ -375,7 +375,7 @@ def test_every_choice(
 def test_what_a_stage_keeps_does_not_show(scene: str, scene_of: Any) -> None:
     """A loaded stage reuses its BVH and light calibration.
 
-    The reused data equals that of a new render.
+    The reused data equals the data of a new render.
     """
     stage = scene_of(scene)
     alone = getattr(stage, "scene", stage)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stages far from the world origin render the same images as stages near the origin."""
+"""Tests that stages render the same images far from the world origin as near it."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ pytestmark = needs("wavecomb._core")
 
 FAR = (5e8, 0.0, -5e8)
 EXACT = (300 * CELL, 0.0, -50 * CELL)
-"""A multiple of the cell size of render origins, for which the image is equal bit for bit."""
+"""Offset by a multiple of the grid spacing of scene origins, so that images are bit-identical."""
 
 PARTS = """
 def Camera "Camera" {
@@ -247,7 +247,7 @@ def test_parts_of_an_image(tmp_path: Path) -> None:
 
 
 def test_frames_are_what_they_are_alone(tmp_path: Path) -> None:
-    """If the camera moves far, the stage is read again with another origin."""
+    """If the camera moves far away, the stage is read again with a new origin."""
     flight = f"0: ({CELL * 6}, 2, 9), 1: ({CELL * 6 + 1}, 2, 9), 2: ({CELL * 8}, 2, 9)"
     still = "{ 0: (0, 2, 9), 1: (0.5, 2, 9) }"
     assert still in PARTS

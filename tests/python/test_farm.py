@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Farm jobs: tiles, keys, part files, assembled images, damaged jobs."""
+"""Tests farm jobs: tiles, keys, part files, assembled images and damaged jobs."""
 
 from __future__ import annotations
 
@@ -288,7 +288,7 @@ def test_a_part_counts_only_if_it_is_right(stage: Path, tmp_path: Path) -> None:
 
 
 def test_bits_of_a_part_that_flip_anywhere_are_found(stage: Path, tmp_path: Path) -> None:
-    """A flipped bit is detected, unless it is in unused bytes and the pixels are correct."""
+    """A flipped bit is detected, unless it is in unused bytes, where it changes no pixel."""
     folder = job(stage, tmp_path, size=(8, 8), spp=1, tiles="1x1")
     render_all(folder)
     file = folder.part(Task(0, 0))
@@ -345,7 +345,7 @@ def test_tiles_are_the_image(stage: Path, tmp_path: Path, kind: str) -> None:
 
 @pytest.mark.slow
 def test_a_border_that_was_too_narrow(stage: Path, tmp_path: Path) -> None:
-    """A border that was too narrow is detected and widened."""
+    """A tile border that was too narrow is detected and widened."""
     options = {"size": (64, 48), "spp": 48, "adaptive": 0.03}
     folder = job(stage, tmp_path, **options)
     render_all(folder, checks=1)

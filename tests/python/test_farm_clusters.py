@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Jobs on Dask clusters with and without TLS, and on Slurm."""
+"""Tests farm jobs on Dask clusters, with and without TLS, and on Slurm."""
 
 from __future__ import annotations
 
@@ -145,7 +145,7 @@ def cluster(
 
 @pytest.mark.slow
 def test_by_dask(stage: Path, tmp_path: Path) -> None:
-    """The image equals that of a render in one process. Workers read a changed stage again."""
+    """The image equals the image of a render in one process. Workers read a changed stage again."""
     here = tmp_path / "s.usda"
     here.write_text(f"#usda 1.0\n( subLayers = [@{stage}@] )\n")
     folder = made(here, tmp_path)

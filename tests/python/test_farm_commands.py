@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`wavecomb farm` from end to end: equal images, resuming, tiles by other schedulers."""
+"""Tests `wavecomb farm` from end to end: equal images, resuming, tiles by other schedulers."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def run(*words: str | Path) -> subprocess.CompletedProcess[str]:
 
 
 def one_line(done: subprocess.CompletedProcess[str], *said: str) -> None:
-    """Asserts that a command ended with one line on standard error."""
+    """Asserts that a command ended and printed one line on standard error."""
     assert done.returncode == 2 and done.stderr.count("\n") == 1, done.stderr
     for text in said:
         assert text in done.stderr, done.stderr
@@ -233,7 +233,7 @@ PLANTED = 'from pathlib import Path\nPath(__file__).with_name("RAN").touch()\nra
 
 @pytest.mark.slow
 def test_modules_in_the_working_folder_never_run(stage: Path, tmp_path: Path) -> None:
-    """Dask puts the working folder first on the module path of its workers; Wavecomb must not."""
+    """Unlike Dask, Wavecomb must not put the working folder on the workers' module path."""
     place = tmp_path / "cwd"
     place.mkdir()
     for name in ("json", "signal", "struct", "yaml", "distributed", "wavecomb", "numpy", "pxr"):

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Workers, schedulers and clients that are killed or hang, full disks, concurrent clients.
 
-The image equals the undisturbed one bit for bit, or the command ends with one line and resuming
-gives that image.
+The image is bit-identical to the image of an undisturbed run, or the command ends with one line and
+resuming gives that image.
 """
 
 from __future__ import annotations
@@ -157,7 +157,7 @@ def test_a_stage_that_kills_its_workers(stage: Path, tmp_path: Path) -> None:
 
 
 def test_a_worker_that_hangs(stage: Path, tmp_path: Path) -> None:
-    """The worker is restarted, and another one renders its task."""
+    """The worker is restarted, and another worker renders its task."""
     folder = made(stage, tmp_path, 2000, hang_s=8.0)
     client = client_of(folder)
     try:
@@ -259,7 +259,7 @@ cp a.exr "$OUT"
 
 
 def test_a_disk_that_is_full(stage: Path, tmp_path: Path) -> None:
-    """One line names the file, no file is partial, and resuming with space gives the image."""
+    """One line names the file, no partial file is left, and a retry with space gives the image."""
     disk, out = tmp_path / "disk", tmp_path / "out.exr"
     disk.mkdir()
     try:

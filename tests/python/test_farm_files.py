@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files that a stage needs: layers, textures, tiles, profiles, images in MaterialX files."""
+"""Tests the list of files that a stage needs, such as layers, textures and IES profiles."""
 
 from __future__ import annotations
 
@@ -156,7 +156,7 @@ def test_files_that_differ(tmp_path: Path) -> None:
 
 
 def test_a_texture_that_goes_while_a_job_runs(tmp_path: Path) -> None:
-    """The images fail with the name of the missing texture. No placeholder is drawn."""
+    """Instead of drawing a placeholder, the images fail with the name of the missing texture."""
     write_image(tmp_path / "a.png", np.zeros((4, 4, 3), np.uint8))
     stage = tmp_path / "s.usda"
     stage.write_text("#usda 1.0\n" + textured("M", "a.png", 1))

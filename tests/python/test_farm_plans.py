@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plans: pilot renders of an image that is rendered in tiles, made once for all of its tiles."""
+"""Tests plans: results of pilot renders, made only once for all tiles of an image."""
 
 from __future__ import annotations
 

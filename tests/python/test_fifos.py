@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Special files, such as FIFOs, are refused in one line, and nothing waits for them."""
+"""Tests that special files, such as FIFOs, are refused in one line, without any waiting."""
 
 from __future__ import annotations
 

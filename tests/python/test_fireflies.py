@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Firefly reweighting: what it removes and keeps, and equal images for all schedules."""
+"""Tests firefly reweighting: removed and preserved light, and independence of schedules."""
 
 from __future__ import annotations
 

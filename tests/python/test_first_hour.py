@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Commands and code that new users type first: short commands, stages in memory, mistakes."""
+"""Tests commands and code that new users type first, including typical mistakes."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A forked process renders like a newly started one."""
+"""Tests that a forked process renders like a newly started process."""
 
 from __future__ import annotations
 

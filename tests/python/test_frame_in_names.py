@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Frame numbers in the file name of a single image, formatted as usdrecord and husk do."""
+"""Tests frame numbers in the names of single images, formatted as by usdrecord and husk."""
 
 from __future__ import annotations
 

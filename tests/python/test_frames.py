@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sequences: frame numbers in text, and frames that equal single renders."""
+"""Tests sequences: parsing of frame ranges, and frames that equal single renders."""
 
 import json
 import os
@@ -116,7 +116,7 @@ def vary_camera(stage):
 
 
 def vary_lens(stage):
-    """Makes the camera invalid in one frame, and disables depth of field in the next frame."""
+    """Makes the camera invalid in one frame and disables depth of field in the next frame."""
     camera = UsdGeom.Camera.Get(stage, "/World/Rig/Camera")
     ramp(camera.CreateFocalLengthAttr(), [50, 0, 50, 50])
     ramp(camera.CreateFStopAttr(), [0.5, 0.5, 0, 2])
@@ -157,7 +157,7 @@ def vary_light(stage):
 
 
 def subdivide(stage):
-    """Turns two of the squares into subdivision surfaces, one of them with several colours."""
+    """Turns two of the squares into subdivision surfaces, one of which has several colours."""
     for i in (0, 2):
         UsdGeom.Mesh.Get(stage, f"/World/Q{i}").GetSubdivisionSchemeAttr().Set("catmullClark")
     colours = UsdGeom.Mesh.Get(stage, "/World/Q2").GetDisplayColorPrimvar()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stages without a camera: the visible objects fill the image, for any shape and aspect ratio."""
+"""Tests that visible objects fill the image of a stage without a camera."""
 
 import tracemalloc
 
@@ -111,7 +111,7 @@ def test_what_is_seen_fills_the_picture(number, tmp_path):
 
 
 def within(view, points, size):
-    """Returns the least and greatest image coordinates of points, in [-1, 1]."""
+    """Returns the smallest and largest image coordinates of points, in [-1, 1]."""
     local = np.c_[points, np.ones(len(points))] @ np.linalg.inv(view.transform)
     x0, x1, y0, y1 = camera_window(view.options, *size)
     flat = view.options.get("projection") == "orthographic"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Gaussian splats: reading, images in closed form, equal images for all schedules."""
+"""Tests Gaussian splats: reading, closed forms, and equal images for all schedules."""
 
 from __future__ import annotations
 
@@ -214,7 +214,7 @@ def test_a_capture_becomes_a_stage(tmp_path: Path) -> None:
 
 
 def test_colours_of_captures_are_decoded() -> None:
-    """Colours are converted from sRGB in every direction, exactly if the colour is constant."""
+    """Colours are converted from sRGB in every direction; constant colours convert exactly."""
     rng = np.random.default_rng(2)
     views = rng.normal(size=(64, 3))
     views /= np.linalg.norm(views, axis=1, keepdims=True)
@@ -235,14 +235,14 @@ def test_colours_of_captures_are_decoded() -> None:
 
 
 def sidak(tests: int, level: float = 1e-4) -> float:
-    """Returns the limit that the largest of ``tests`` |z| exceeds with probability ``level``."""
+    """Returns the limit that the largest |z| of ``tests`` exceeds with probability ``level``."""
     from scipy.stats import norm
 
     return float(norm.isf(0.5 * (1.0 - (1.0 - level) ** (1.0 / tests))))
 
 
 def test_a_stack_is_composited_front_to_back(tmp_path: Path) -> None:
-    """The mean is sum c_i alpha_i prod (1 - alpha_j) before a black sky, in depth order."""
+    """The mean is sum c_i alpha_i prod (1 - alpha_j) in depth order, in front of a black sky."""
     rng = np.random.default_rng(8)
     n = 6
     places = np.stack([rng.uniform(-0.6, 0.6, n), rng.uniform(-0.6, 0.6, n), -np.arange(n)], axis=1)
@@ -324,7 +324,7 @@ def test_colours_are_those_of_scipys_harmonics(tmp_path: Path) -> None:
 
 
 def test_they_cast_shadows(tmp_path: Path) -> None:
-    """A splat before the sun transmits 1 - alpha of the light."""
+    """A splat in front of the sun transmits 1 - alpha of the light."""
     opacity, off = 0.8, 0.7
     alpha = opacity * math.exp(-0.5 * off**2)
     floor = """def Mesh "Floor" {

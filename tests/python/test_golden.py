@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Scenes of tests/scenes, rendered by the wavefront integrator, against reference images."""
+"""Tests renders of tests/scenes by the wavefront integrator against reference images."""
 
 from __future__ import annotations
 

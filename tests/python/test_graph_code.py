@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Value graphs: operations, folding, registers, and programs against NumPy."""
+"""Tests value graphs: operations, folding, registers, and agreement with NumPy."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Path guiding: equal images for all schedules, no bias, crops, statistics."""
+"""Tests path guiding: equal images for all schedules, no bias, crops and statistics."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _core = pytest.importorskip("wavecomb._core")
 
 SIZE = 64
 SPP = 32
-"""The smallest number of samples of which an eighth suffices to train a guiding field."""
+"""Smallest sample count for which an eighth of the samples suffices to train a guiding field."""
 WAYS: list[dict[str, Any]] = [
     {"guiding": "on"},
     {"guiding": "on", "roulette": "efficient"},
@@ -209,7 +209,7 @@ def test_a_damaged_field_is_refused(cornell: Any, stopped: dict[str, Any]) -> No
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["cornell", "mixed"])
 def test_is_unbiased(request: pytest.FixtureRequest, name: str) -> None:
-    """Means over many seeds agree with those of unguided renders, for each tile of the image."""
+    """Means over many seeds agree with unguided renders' means, for each tile of the image."""
     scene = request.getfixturevalue(name)
     seeds = 12
 
@@ -356,7 +356,7 @@ def test_layers_say_what_became_of_bounces(cornell: Any) -> None:
 
 
 def floor(albedo: float) -> Any:
-    """Returns a floor below the horizon under an even sky: paths have at most one bounce."""
+    """Returns a floor below the horizon of a uniform sky; paths have at most one bounce."""
     builder = wavecomb.SceneBuilder()
     quad = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
     points = np.array([[-9, -1, 9], [9, -1, 9], [9, -1, -9], [-9, -1, -9]], np.float32)

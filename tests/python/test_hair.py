@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hair: parameters from MaterialX nodes, equal images for all schedules, closed forms."""
+"""Tests hair: parameters from MaterialX nodes, equal images for all schedules, closed forms."""
 
 from __future__ import annotations
 
@@ -226,7 +226,7 @@ def test_white_hair_under_a_white_sky_is_white(kind: str) -> None:
 
 @pytest.mark.slow
 def test_lamps_are_what_each_brings_alone() -> None:
-    """With several lights, a vertex samples one of three; a single light needs no selection."""
+    """The image with several lights equals the sum of the images with each light alone."""
     lamps = [
         ((1.5, 1, 2), 0.3, (9, 6, 3)),
         ((-2, 0, -2), 0.5, (2, 4, 9)),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX's hextiledimage and hextilednormalmap against a second implementation."""
+"""Tests MaterialX's hextiledimage and hextilednormalmap against a second implementation."""
 
 import numpy as np
 import pytest

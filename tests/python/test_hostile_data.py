@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Malicious checkpoints, images, profiles and documents cause one error line in a short time."""
+"""Tests that malicious checkpoints, images and documents soon cause one error line."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ def test_archives_are_looked_at_before_they_are_read(
 
 
 def test_parts_that_overlap(whole: Path, tmp_path: Path) -> None:
-    """All directory entries refer to the same bytes, so they exceed the size of the file."""
+    """All directory entries refer to the same bytes, so their total size exceeds the file's."""
     with zipfile.ZipFile(whole) as source:
         info, data = source.infolist()[0], source.read(source.infolist()[0])
     file = tmp_path / "a.ckpt"
@@ -334,7 +334,7 @@ def test_profiles_that_lie(tmp_path: Path) -> None:
 
 
 def chain(folder: Path, links: int, each: int = 1) -> Path:
-    """Returns documents each of which includes the next one, ``each`` times."""
+    """Returns documents, each of which includes the next document ``each`` times."""
     for i in range(links):
         lines = f'<xi:include href="d{i + 1}.mtlx"/>\n' * each
         write(

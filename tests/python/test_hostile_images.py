@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Images: limits on decoding memory, temporary files, names inside packages."""
+"""Tests malicious images: memory limits, temporary files, and names inside packages."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def test_the_package_names_no_file_of_ours(
 
 
 def test_jpeg_2000_has_an_ending_of_ours(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """OpenImageIO detects JPEG 2000 by the file name, so it needs a file; others stay in memory."""
+    """OpenImageIO detects JPEG 2000 by the file name, so it needs a file; other formats do not."""
     file = tmp_path / "a.jp2"
     write(file, "uint8")
     endings: list[str] = []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Names of image files in a stage cannot lead out of the folder that the user chose."""
+"""Tests that names of image files in a stage cannot lead out of the chosen folder."""
 
 import os
 from pathlib import Path

@@ -208,7 +208,7 @@ def test_links_are_followed(tmp_path: Path) -> None:
 
 
 def test_an_abandoned_folder_is_removed(tmp_path: Path) -> None:
-    """The temporary folder of a killed process is not locked, so it can be removed."""
+    """The temporary folder of a killed process is not locked and can therefore be removed."""
     code = (
         "import os, sys; from pathlib import Path\n"
         "from wavecomb.image.files.output_file import replacing\n"
@@ -224,7 +224,7 @@ def test_an_abandoned_folder_is_removed(tmp_path: Path) -> None:
 
 
 def test_a_folder_in_use_stays(tmp_path: Path) -> None:
-    """A locked folder stays even if no process has its id, as from another container."""
+    """A locked folder is kept even if its owner's id is unknown, as from another container."""
     with replacing(tmp_path / "a.txt") as part:
         part.write_text("first")
         with replacing(tmp_path / "b.txt") as other:

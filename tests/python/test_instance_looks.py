@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Materials in instances that read primvars of the instances and of the meshes in them."""
+"""Tests materials in instances that read primvars of the instances and of their meshes."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Media inside meshes: closed forms, furnaces, priorities, shadows, schedules."""
+"""Tests media inside meshes: closed forms, furnaces, priorities, shadows and schedules."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def test_a_camera_in_fog_knows_where_it_is() -> None:
     [((1.0, 0.0), (1.0, 1.0)), ((0.0, 0.0), (0.75, 1.25)), ((-1.0, 2.0), (0.75, 1.25))],
 )
 def test_where_two_overlap_the_higher_priority_is_there(priorities: Any, lengths: Any) -> None:
-    """Where slabs overlap, the higher priority determines the medium, or else the last entry."""
+    """Where slabs overlap, the medium has the higher priority or, if equal, was entered last."""
     builder = wavecomb.SceneBuilder()
     other = SIGMA[::-1]
     for (low, high), sigma, priority in zip(
@@ -217,7 +217,7 @@ def test_what_casts_no_shadow_neither_stops_nor_dims_light(ior: float, how: str)
 
 
 def test_shadow_rays_meet_bounds_close_behind_a_cut_out() -> None:
-    """Light that passes a card of opacity 1/2 close below a slab is still dimmed by the slab."""
+    """A slab still dims light that passes a card of opacity 1/2 close below the slab."""
     pixels = []
     for sigma in (np.zeros(3) + 1e-6, SIGMA):
         builder = wavecomb.SceneBuilder()
@@ -314,7 +314,7 @@ def thin_fog(as_mesh: bool, seed: int, x: float = 3.0, **more: Any) -> Any:
 
 
 def test_fog_in_a_mesh_has_no_more_noise() -> None:
-    """The noise equals that of a volume, since free-flight samples are well distributed."""
+    """The noise equals the noise of a volume, since free-flight samples are well distributed."""
     mesh, volume = (
         np.array([thin_fog(as_mesh, seed, depth=4) for seed in range(8)])
         for as_mesh in (True, False)
@@ -499,7 +499,7 @@ def test_a_stage_says_what_is_inside(tmp_path: Path) -> None:
 
 
 def test_what_volumes_miss_in_cloudy_glass_is_said(tmp_path: Path) -> None:
-    """If there are volumes, a warning says that light scattered in cloudy glass misses them."""
+    """If there are volumes, a warning says that light scattered in cloudy glass ignores them."""
     from usd_recorder import load, said
 
     volume = 'def Volume "V" { float3[] extent = [(-0.1, -0.1, -0.1), (0.1, 0.1, 0.1)] }\n'

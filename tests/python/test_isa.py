@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Choice of the native library by instruction set, and equal images from all of them."""
+"""Tests the choice of the native library by instruction set, and equal images of all libraries."""
 
 from __future__ import annotations
 

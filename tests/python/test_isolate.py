@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Libraries may crash or hang in a child process: the caller gets one line."""
+"""Tests that the caller gets one line if a library crashes or hangs in a child process."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""kill -9 at random moments: files are complete or absent, and later runs are not affected."""
+"""Tests kill -9 at random moments: files are complete or absent, and later runs still work."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def box(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Nine squares with 7 MB of noise textures before a moving camera."""
+    """Nine squares with 7 MB of noise textures in front of a moving camera."""
     folder = tmp_path_factory.mktemp("pictures")
     noise = np.random.default_rng(3)
     text = "#usda 1.0\n"
@@ -111,7 +111,7 @@ class Killer:
         self.whole_s = time.monotonic() - start
 
     def start(self, name: str) -> subprocess.Popen[str]:
-        """Starts the command, which resumes from files that are present."""
+        """Starts the render command, which resumes from the files that already exist."""
         out = self.folder / (f"{name}.#.exr" if self.kind.frames else f"{name}.exr")
         words = [str(self.stage), "-o", str(out), "--size", "48", "48", "--threads", "1"]
         words += [*self.kind.options]
@@ -133,7 +133,10 @@ class Killer:
         )
 
     def kill(self, times: int) -> int:
-        """Kills the render a number of times. Returns how often it ended before it was killed."""
+        """Kills the render a number of times.
+
+        Returns how often the render ended before it was killed.
+        """
         killed = ended = 0
         while killed < times:
             process = self.start("a")
@@ -154,7 +157,7 @@ class Killer:
         return ended
 
     def look(self) -> None:
-        """Asserts that all files are complete and no process is left."""
+        """Asserts that all files are complete and that no process still runs."""
         deadline = time.monotonic() + 20
         while left := processes_below(self.temporary):
             assert time.monotonic() < deadline, left
@@ -167,7 +170,7 @@ class Killer:
                 same_pictures(self.folder / whole, self.folder / name)
 
     def finish(self) -> None:
-        """Lets the render end, and asserts that the result equals an undisturbed one."""
+        """Lets the render end, and asserts that its result equals an undisturbed render's."""
         process = self.start("a")
         _, errors = process.communicate()
         assert process.returncode == 0, errors

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The kitchen: objects rest on their supports, lamps hang free, most materials are glossy."""
+"""Tests that objects of the kitchen rest on supports, and that most materials are glossy."""
 
 from __future__ import annotations
 

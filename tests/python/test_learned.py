@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Learned data given to other renders: crops, sequences, farms, invalid files."""
+"""Tests learned data given to other renders: crops, sequences, farms and invalid files."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ pytest.importorskip("wavecomb._core")
 
 SIZE = 64
 SPP = 32
-"""The smallest number of samples of which an eighth suffices to train a guiding field."""
+"""Smallest sample count for which an eighth of the samples suffices to train a guiding field."""
 
 
 @pytest.fixture(scope="module")

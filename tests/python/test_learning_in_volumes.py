@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Guiding, light calibration and learned roulette with scattering volumes."""
+"""Tests guiding, light calibration and learned roulette with scattering volumes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from wavecomb import _core
 pytestmark = needs("wavecomb._core")
 
 SIZE, SPP, SEEDS = 48, 60, 5
-"""A number of samples of which an eighth suffices to train a guiding field."""
+"""Sample count for which an eighth of the samples suffices to train a guiding field."""
 
 WAYS: list[dict[str, Any]] = [
     {"guiding": "on"},
@@ -78,7 +78,7 @@ def quarters(scene: Any, seed: int, **options: Any) -> Any:
 
 @pytest.fixture(scope="module")
 def plain(scene: Any) -> Any:
-    """Quarters of images of several seeds, without learning."""
+    """Means of image quarters for several seeds, without learning."""
     off: dict[str, Any] = {"guiding": "off", "roulette": "throughput", "light_selection": "power"}
     return np.array([quarters(scene, seed, **off) for seed in range(SEEDS)])
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Setting ``allocate`` (sample allocation) combined with path guiding.
+"""Tests the setting ``allocate`` (sample allocation) combined with path guiding.
 
 test_checkpoint.py tests resuming, and tests/statistics/test_learning.py tests that there is no
 bias.

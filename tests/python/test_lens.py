@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lenses: distortion, overscan, apertures, rolling shutters, motion vectors."""
+"""Tests lenses: distortion, overscan, apertures, rolling shutters and motion vectors."""
 
 from __future__ import annotations
 

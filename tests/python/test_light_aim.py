@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Aimed light paths: equal images for all schedules, and less noise."""
+"""Tests aimed light paths: equal images for all schedules, and less noise."""
 
 from __future__ import annotations
 

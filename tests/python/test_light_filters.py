@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Light filters, and shadows with a colour or a maximum distance: reading and rendering."""
+"""Tests light filters, and shadows with a colour or a maximum distance."""
 
 from __future__ import annotations
 

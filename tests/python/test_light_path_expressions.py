@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Light path expressions: light in each layer, partitions that add up, and request syntax."""
+"""Tests light path expressions: light per layer, layers that sum to the beauty, and syntax."""
 
 from __future__ import annotations
 

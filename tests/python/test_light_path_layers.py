@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Direct and indirect layers, light groups and light path expressions with light paths."""
+"""Tests direct and indirect layers, light groups and expressions with light paths."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Light paths: equal images for all schedules, crops, and unsupported features."""
+"""Tests light paths: equal images for all schedules, crops, and unsupported features."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def test_splats_go_to_one_pixel_where_a_denoiser_follows(stages: Any) -> None:
 
 
 def test_a_denoiser_removes_the_noise_of_light_paths(stages: Any) -> None:
-    """Noise that is equal in neighbouring pixels would remain as grain."""
+    """After denoising, noise that is equal in neighbouring pixels would remain as grain."""
     pytest.importorskip("pyoidn")
     stage = wavecomb.load(stages("lens"))
     grain = {}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Adaptive renders with light paths: reproducible, and as noisy as reported."""
+"""Tests that adaptive renders with light paths are reproducible and as noisy as reported."""
 
 from __future__ import annotations
 

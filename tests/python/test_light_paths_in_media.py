@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Light paths are refused in scenes with media, or avoided by "auto"; no image is darker."""
+"""Tests that scenes with media refuse light paths, and that "auto" uses camera paths."""
 
 from __future__ import annotations
 

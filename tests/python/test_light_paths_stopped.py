@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Light paths in stopped and resumed renders, with lenses and motion blur."""
+"""Tests light paths in stopped and resumed renders, with lenses and motion blur."""
 
 from __future__ import annotations
 

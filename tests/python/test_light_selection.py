@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Light selection by tree: same mean as by power, less noise, equal images for all schedules."""
+"""Tests light selection by tree: unchanged mean, less noise, equal images for all schedules."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def test_one_picture_for_all_schedules(glass: bool) -> None:
 
 
 def test_light_groups_follow_the_choice() -> None:
-    """Light groups add up to the beauty, and each equals a render with its lights alone."""
+    """Light groups add up to the beauty, and each group equals a render with its lights alone."""
     scene = builder_scene().build()
     picture = render(scene, "tree", spp=64, aovs=["light_groups"])
     groups = {name: layer for name, layer in picture.aovs.items() if name.startswith("light_")}

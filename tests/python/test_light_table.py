@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The core's table of light parameters: every consumer picks up new rows."""
+"""Tests that every user of the core's table of light parameters picks up new rows."""
 
 from __future__ import annotations
 

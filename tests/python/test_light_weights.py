@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Light calibration: less noise, same mean, equal images for all schedules."""
+"""Tests light calibration: less noise, the same mean, and equal images for all schedules."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Options of ``wavecomb render`` pass through few modules on their way to the core."""
+"""Tests that options of ``wavecomb render`` pass through few modules on the way to the core."""
 
 from __future__ import annotations
 
@@ -85,12 +85,12 @@ class Follower:
 
 
 def module_of(code: CodeType) -> str:
-    """Returns the file of code in the package, relative to it, else ""."""
+    """Returns the file of code, relative to the package, or "" for code outside the package."""
     return code.co_filename.removeprefix(ROOT) if code.co_filename.startswith(ROOT) else ""
 
 
 def test_options_visit_few_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Options visit few files from the parsed command to the core, not counting ``wavecomb.usd``.
+    """Options pass through few files from command to core, not counting ``wavecomb.usd``.
 
     ``load_stage`` takes all load options as one object, ``LoadOptions``.
     """

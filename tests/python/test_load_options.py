@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The table of loading options: every consumer picks up new rows."""
+"""Tests that every user of the table of load options picks up new rows."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Loading: images read ahead, threads, memory."""
+"""Tests of loading: images that are read ahead, threads and memory."""
 
 from __future__ import annotations
 
@@ -289,7 +289,7 @@ def test_instances_are_not_held_twice_while_a_scene_is_made() -> None:
 
 @pytest.mark.slow
 def test_what_is_loaded_only_when_it_is_needed(tmp_path: Path) -> None:
-    """OpenImageIO loads only for an image to read, and Rich only for a terminal."""
+    """OpenImageIO is imported only to read an image, and Rich only for a terminal."""
     path = tmp_path / "stage.usda"
     stage = Usd.Stage.CreateNew(str(path))
     UsdGeom.Sphere.Define(stage, "/Ball")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX networks of a stage: constants, textures, and value graphs."""
+"""Tests MaterialX networks of a stage: constants, textures and value graphs."""
 
 from __future__ import annotations
 
@@ -359,7 +359,7 @@ def test_networks_too_large_are_said_and_leave_parameters_out(tmp_path):
 
 
 def test_graph_of_a_real_scene_renders_as_its_formula(tmp_path):
-    """Emission by a ramp over texture coordinates renders as the ramp."""
+    """Emission that a ramp over texture coordinates drives is rendered as that ramp."""
     nodes = UV + node(
         "Ramp",
         "ND_ramp4_color3",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The number of files that a material passes from USD to its kernel is limited."""
+"""Tests that a material passes through few files from USD to its kernel."""
 
 import functools
 import sys

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stages where MaterialX is not installed, or its package is incomplete."""
+"""Tests loading of stages if MaterialX is not installed or its package is incomplete."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ def reason(identifier):
 
 
 def support_of(identifier):
-    """Returns how a library node is compiled: "primitive", "graph", or "" if it cannot be."""
+    """Returns how a library node is compiled: "primitive", "graph", or "" if not at all."""
     definition = definition_of(identifier)
     if definition is None:
         return ""
@@ -106,7 +106,7 @@ def test_no_node_that_is_read_says_anything(category):
 
 
 def both_ways():
-    """Yields nodes that are implemented here although the library has a graph for them."""
+    """Yields nodes that Wavecomb implements although the library has graphs for these nodes."""
     for identifier in patterns():
         category = definition_of(identifier).category
         is_here = primitive(category, identifier) is not None or category in PER_COMPONENT
@@ -134,7 +134,7 @@ def test_what_is_written_here_is_the_library_s_graph(identifier):
 
 @pytest.mark.parametrize("category", sorted(by_category("primitive")))
 def test_defaults_of_primitives_are_the_library_s(category):
-    """A node without inputs equals one with all inputs set to the defaults of its definition."""
+    """A node without inputs equals a node with all inputs set to the defaults of its definition."""
     for identifier in by_category("primitive")[category]:
         bare, full = Node(identifier), Node(identifier)
         full.networks.make = bare.networks.make

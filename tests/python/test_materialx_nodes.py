@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX nodes against their formulas: primitives and graphs of the library."""
+"""Tests MaterialX nodes against their formulas, both primitives and graphs of the library."""
 
 from __future__ import annotations
 
@@ -280,7 +280,7 @@ def test_normal_maps_of_gltf_read_their_file():
 
 
 def test_triplanar_projection_mixes_three_images(monkeypatch):
-    """Images are blended by the object-space normal, and each is read along its axis."""
+    """Images are blended by the object-space normal, and each image is projected along its axis."""
     read = []
 
     def numbered(n, uv, *_):

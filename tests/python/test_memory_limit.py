@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``--memory-limit``: decompression bombs end the child process with one line."""
+"""Tests that decompression bombs end the child process with one line (``--memory-limit``)."""
 
 from __future__ import annotations
 
@@ -75,7 +75,10 @@ def packed_texture(folder: Path) -> list[object]:
 
 
 def large_picture(folder: Path) -> list[object]:
-    """Writes a small stage. Returns a command that renders the stage with too large a film."""
+    """Writes a small stage.
+
+    Returns a command that renders the stage with a film that is too large.
+    """
     (folder / "s.usda").write_text('#usda 1.0\ndef Sphere "S" {\n    double radius = 1\n}\n')
     return ["render", folder / "s.usda", "-o", folder / "o.exr", "--size", 6000, 6000]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``wavecomb merge``: weights by samples, and images that do not match."""
+"""Tests ``wavecomb merge``: weights by sample counts, and images that cannot be merged."""
 
 from __future__ import annotations
 
@@ -137,7 +137,7 @@ def test_pixels_without_samples_or_errors_say_nothing(tmp_path: Path) -> None:
 
 
 def test_parts_are_as_good_as_the_whole(stage: Path, tmp_path: Path) -> None:
-    """Four merged renders have the mean, variance and error of one with four times the samples."""
+    """Four merged renders have the mean, variance and error of one render with all samples."""
     names = []
     settings: dict[str, Any] = {"size": (32, 24), "error": True, "sampler": "independent"}
     for seed, spp in enumerate((16, 48, 64, 128)):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Light paths merged with points seen through mirrors and glass."""
+"""Tests the merging of light paths with points seen through mirrors and glass."""
 
 from __future__ import annotations
 

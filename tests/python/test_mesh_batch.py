@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Simple meshes are added to the scene together, with the result of adding each separately."""
+"""Tests that adding simple meshes together gives the same result as one at a time."""
 
 import pytest
 from usd_recorder import QUAD, write
@@ -56,7 +56,7 @@ def mesh(number: int, body: str, material: str = "", metadata: str = "") -> str:
 
 
 def meshes(count: int) -> str:
-    """Returns simple meshes with unusual ones between them."""
+    """Returns simple meshes with unusual meshes between them."""
     out = []
     for i in range(count):
         body = UNUSUAL[i // 9 % len(UNUSUAL)] if i % 9 == 8 else (QUAD, TRIANGLES)[i % 2]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Errors are found before loading where possible, and messages say what to do."""
+"""Tests that errors are found before loading if possible, and that messages give advice."""
 
 from __future__ import annotations
 

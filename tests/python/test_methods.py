@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/methods.md lists every paper that a source or page cites, with the right files."""
+"""Tests that docs/methods.md lists every cited paper, with the files that cite the paper."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Motion blur: values read from stages, and rendered images."""
+"""Tests motion blur: values read from stages, and rendered images."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lights that move while the shutter is open."""
+"""Tests lights that move while the shutter is open."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Bounces and light samples apply the same multipliers and light links."""
+"""Tests that bounces and light samples apply the same multipliers and light links."""
 
 from __future__ import annotations
 

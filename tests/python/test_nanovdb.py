@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-""".nvdb files: values, quantised values, names, compression, and broken files."""
+"""Tests .nvdb files: values, quantised values, names, compression and broken files."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def test_the_same_grids_give_the_same_bytes(tmp_path: Path) -> None:
 
 
 def test_a_picture_is_that_of_the_vdb_file(tmp_path: Path) -> None:
-    """Image and messages equal those for the .vdb file."""
+    """Image and messages are the same as for the .vdb file."""
     pictures = []
     for name in ("a.vdb", "a.nvdb"):
         (tmp_path / name).write_bytes(vdb_bytes(name))

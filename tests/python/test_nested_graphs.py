@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX documents with nested definitions: small files that expand to billions of nodes."""
+"""Tests small MaterialX documents whose nested definitions expand to billions of nodes."""
 
 import time
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Images and progress in a notebook (with a fake IPython), and the window from Python."""
+"""Tests images and progress in a notebook (with a fake IPython), and the window from Python."""
 
 from __future__ import annotations
 

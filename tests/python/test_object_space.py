@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX nodes that convert between object space and world space."""
+"""Tests MaterialX nodes that convert between object space and world space."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files and names of the core that pages about its code mention."""
+"""Tests that all files and names of the core in documentation pages exist."""
 
 from __future__ import annotations
 

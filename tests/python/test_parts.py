@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Missing dependencies skip a test, or fail it in CI; long tests run in `make test-long`."""
+"""Tests that missing dependencies skip a test, or fail it in CI, and that long tests are
+separate."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""SSIM, FLIP, trimmed relMSE and the z-test on images with known results."""
+"""Tests SSIM, FLIP, trimmed relMSE and the z-test on images with known results."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The fast path for meshes of triangles or quads gives the result of the general path."""
+"""Tests the fast path for meshes of triangles or quads against the general path."""
 
 from __future__ import annotations
 

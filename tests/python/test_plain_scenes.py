@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Generated stages with plain UsdPreviewSurface materials, as other exporters write them."""
+"""Tests generated stages with plain UsdPreviewSurface materials, as other exporters write."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The examples of docs/writing-a-policy.md run as printed."""
+"""Tests that the examples of docs/writing-a-policy.md run as printed."""
 
 from __future__ import annotations
 

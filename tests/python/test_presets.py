@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""CMakePresets.json is valid, and docs/ide.md lists its presets."""
+"""Tests that CMakePresets.json is valid, and that docs/ide.md lists its presets."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Python processes that Wavecomb starts: imports, inheritance and lifetime."""
+"""Tests the Python processes that Wavecomb starts: imports, inheritance and lifetime."""
 
 from __future__ import annotations
 
@@ -443,7 +443,8 @@ STARTERS = {
     "sys": {"executable"},
 }  # fmt: skip
 CLUSTERS = {"multiprocessing", "ProcessPoolExecutor", "LocalCluster", "Nanny", "SubprocessCluster"}
-"""Users of multiprocessing, whose children import from the working folder. No file may use them."""
+"""Names that stand for multiprocessing, which no file may use, since its child processes import
+from the working folder."""
 
 WORTH_PARSING = re.compile(
     rf"\b({'|'.join(CLUSTERS)}|subprocess|pty|asyncio|QProcess)\b|sys\.executable"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Bug reports of other USD programs, reproduced with small stages (docs/testing.md)."""
+"""Tests bug reports of other USD programs with small stages (docs/testing.md)."""
 
 from __future__ import annotations
 
@@ -166,7 +166,7 @@ def test_primvars_of_instances_inside_a_point_instancer(tmp_path: Path) -> None:
 
 
 def test_materials_below_prototypes(tmp_path: Path) -> None:
-    """OpenUSD 3483: materials below the scope of the prototypes, one of which no prim uses."""
+    """OpenUSD 3483: materials below the scope of the prototypes; one prototype is not used."""
     look = material("Blue", BLUE).replace("/World/Blue", "/World/Many/Prototypes/Blue")
     ball = f"""( {BOUND} ) {{
                 rel material:binding = </World/Many/Prototypes/Blue>
@@ -215,7 +215,7 @@ def bound(look: str, primvars: str = ST) -> str:
 
 @pytest.mark.parametrize("channels", [3, 4])
 def test_opacity_of_an_image(channels: int, tmp_path: Path) -> None:
-    """OpenUSD 1338: an image without alpha is opaque; one with alpha has that of its pixels."""
+    """OpenUSD 1338: an image without alpha is opaque; otherwise its alpha applies."""
     alpha = np.ones((8, 8), np.float32)
     alpha[:, :4] = 0
     white = np.ones((8, 8, 3), np.float32)
@@ -454,7 +454,7 @@ def test_two_radii(kind: str, tmp_path: Path) -> None:
 
 
 def test_implicit_shapes_from_inside(tmp_path: Path) -> None:
-    """OpenUSD 3686: a camera in a single-sided cube sees its wall."""
+    """OpenUSD 3686: a camera inside a single-sided cube sees the cube's wall."""
     for sided in (0, 1):
         body = f"""def Cube "Room" {{
             double size = 10

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Scheduling policies in Python, in real renders."""
+"""Tests scheduling policies in Python during real renders."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ pytest.importorskip("wavecomb._core")
 
 @pytest.fixture(scope="module")
 def scene() -> Any:
-    """Stripes of five materials with two programs, two of them textured, under an even sky."""
+    """Stripes of five materials (two of them textured) with two programs, under a uniform sky."""
     builder = wavecomb.SceneBuilder()
     rng = np.random.default_rng(1)
     textures = [

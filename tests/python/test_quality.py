@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Quality "auto", the default: what it decides, and that all parts of an image decide alike."""
+"""Tests quality "auto", the default: its decisions, which are equal for all parts of an image."""
 
 from __future__ import annotations
 
@@ -82,8 +82,7 @@ def test_all_parts_and_schedules_decide_alike(caustics: Any, default: Any) -> No
 
 @pytest.mark.slow
 def test_a_decision_is_handed_on(caustics: Any, default: Any) -> None:
-    """Pilot renders are not repeated if an earlier render's decision is given, or known to the
-    renderer."""
+    """A decision that is given, or that the renderer has stored, replaces pilot renders."""
     settings = _core.Settings(**PART)
     again = _core.render(caustics, settings, learned=default.learned)
     assert again.stats["transport"]["why"] == "by an earlier render"
@@ -105,7 +104,7 @@ def test_a_resumed_render_keeps_its_decision(caustics: Any, default: Any) -> Non
 
 
 def test_more_samples_do_not_change_the_transport_of_a_render(caustics: Any) -> None:
-    """A render that had too few samples for light paths does not use them when it is resumed."""
+    """A render that started without light paths, for lack of samples, resumes without them."""
     short = {**PART, "spp": 4}
     stop = StopAt(1)
     _core.render(caustics, _core.Settings(**short), watcher=stop, interval=0.001)
@@ -125,7 +124,7 @@ def test_short_time_limits_leave_no_time_for_pilots(caustics: Any) -> None:
 
 @pytest.mark.slow
 def test_late_pilots_give_up(caustics: Any) -> None:
-    """Pilot renders for 64 threads take too much of 0.5 s, so light paths are not used."""
+    """Pilot renders for 64 threads take too much of a 0.5 s limit, so light paths are not used."""
     stats = render(caustics, time_limit=0.5, threads=64).stats
     assert stats["transport"]["chosen"] == "path"
     assert "too much of the time limit" in stats["transport"]["why"]

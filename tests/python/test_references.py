@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Translators of benchmarks/references.py, on small scenes written for these tests."""
+"""Tests the translators of benchmarks/references.py on small scenes."""
 
 from __future__ import annotations
 

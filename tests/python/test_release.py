@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files and changelogs that tools/release refuses."""
+"""Tests that tools/release refuses invalid files and changelogs."""
 
 from __future__ import annotations
 

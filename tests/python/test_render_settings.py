@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""UsdRender: settings, products and vars, and options that override them."""
+"""Tests UsdRender: settings, products and vars, and options that override them."""
 
 from __future__ import annotations
 

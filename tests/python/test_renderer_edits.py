@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A persistent renderer: edits, concurrent renders, stops, picking, snapshots, regions."""
+"""Tests a persistent renderer: edits, concurrent renders, stops, picking, snapshots, regions."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Materials for other renderers: Arnold's standard_surface is read, others use display colours."""
+"""Tests materials for other renderers, such as Arnold's standard_surface."""
 
 import numpy as np
 import OpenImageIO as oiio

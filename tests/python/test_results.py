@@ -76,7 +76,7 @@ def sections() -> list[str]:
 
 @pytest.mark.parametrize("path", RESULTS, ids=of)
 def test_pages_mark_old_results(path: Path) -> None:
-    """A page that quotes an old result says that it must be measured again."""
+    """A page that quotes an outdated result says that the result must be measured again."""
     shallow = git("rev-parse", "--is-shallow-repository")
     if shallow.returncode != 0 or shallow.stdout.strip() != "false":
         not_here("the history of this repository")

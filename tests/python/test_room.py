@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The generated room: closed, furnished, with many plain materials, and in real size."""
+"""Tests the generated room: it is closed, furnished, in real size, with many plain materials."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""tools/run_parts: order, lanes, times and budgets, closing lines, exit codes."""
+"""Tests tools/run_parts: order, lanes, times, budgets, closing lines and exit codes."""
 
 from __future__ import annotations
 
@@ -37,7 +37,10 @@ def run(folder: Path, rows: str, tier: str = "test") -> subprocess.CompletedProc
 
 
 def test_times_budgets_and_closing_lines(tmp_path: Path) -> None:
-    """Lanes run in parallel. The background lane has low priority and prints at its end."""
+    """Lanes run in parallel.
+
+    The background lane has low priority and prints its output when it ends.
+    """
     done = run(
         tmp_path,
         "test setup setup -     front wall 9\n"

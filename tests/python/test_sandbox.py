@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A compromised child process of a command can do very little."""
+"""Tests that a compromised child process of a command can do very little."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def trying(name, deed):
 
 @pytest.fixture
 def place() -> Iterator[Path]:
-    """Folders for outputs, for the stage, and a third folder. Not below /tmp."""
+    """Three folders: for outputs, for the stage, and an unrelated one. None is below /tmp."""
     with tempfile.TemporaryDirectory(dir=Path.home(), prefix="wavecomb-test-") as name:
         folder = Path(name)
         for one in ("out", "shot", "secret"):
@@ -292,8 +292,9 @@ def test_a_crash_is_one_line(place: Path, deed: str, words: str) -> None:
 
 
 def test_shared_mappings_count_as_memory(place: Path) -> None:
-    """RLIMIT_DATA does not count shared mappings. A control group counts them, if one can be
-    created.
+    """RLIMIT_DATA does not count shared mappings.
+
+    If a control group can be created, it counts shared mappings.
     """
     group = memory.Group.make(300_000_000)
     if group is None:
@@ -387,7 +388,7 @@ def test_required_and_not_there(place: Path, monkeypatch: pytest.MonkeyPatch) ->
 
 @pytest.mark.slow
 def test_without_user_namespaces_auto_works_without(place: Path, tmp_path: Path) -> None:
-    """bubblewrap fails, as it does where user namespaces are not permitted."""
+    """Makes bubblewrap fail, as on systems that do not permit user namespaces."""
     fake = tmp_path / "bwrap"
     fake.write_text("#!/bin/sh\necho 'bwrap: No permissions to create new namespace' >&2\nexit 1\n")
     fake.chmod(0o755)

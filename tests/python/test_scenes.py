@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Procedural stages have the documented contents, and their meshes are valid."""
+"""Tests that procedural stages have the documented contents and valid meshes."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shadow colours of lights seen through volumes."""
+"""Tests shadow colours of lights that are seen through volumes."""
 
 from __future__ import annotations
 

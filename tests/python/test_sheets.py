@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Contact sheets, pages of sequences, wipes, and comparisons of folders."""
+"""Tests contact sheets, pages of sequences, wipes, and comparisons of folders."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Documentation pages: links have targets, and the site is complete."""
+"""Tests documentation pages: links have targets, and the site is complete."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_links_lead_somewhere(page: Path) -> None:
 
 
 def test_nothing_installs_wavecomb_from_an_index() -> None:
-    """Wavecomb is on no package index, so anybody could register its name there."""
+    """Wavecomb is on no package index, so anybody could register its name on one."""
     files = [*PAGES, *(ROOT / "python").rglob("*.py"), ROOT / "Makefile"]
     said = re.compile(r"pip install (?:-\S+ )*['\"]?wavecomb\b")
     assert [file for file in files if said.search(file.read_text(encoding="utf-8"))] == []
@@ -125,7 +125,7 @@ PARTS = {
     "table": r"^\| ---",
     "limits": r"^## Limits",
 }
-"""Parts of a page other than its first sentence, as patterns."""
+"""Patterns of the parts of a page other than its first sentence."""
 WITHOUT = {"faq": {"limits"}, "glossary": {"limits"}, "ide": {"image"}}
 """Page parts that pages may omit. docs/decisions/page-parts.md has the reasons."""
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""UsdSkel against skinning and blend shapes in NumPy."""
+"""Tests UsdSkel against skinning and blend shapes in NumPy."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ def pose(time):
 
 
 def make_stage(*, mesh_order=None, indices, weights, each, constant=False, method=None):
-    """Returns a stage with a skinned mesh that has its own transform, and a skeleton."""
+    """Returns a stage with a skeleton and a skinned mesh; the mesh has a transform."""
     stage = Usd.Stage.CreateInMemory()
     stage.SetStartTimeCode(1)
     stage.SetEndTimeCode(4)
@@ -152,7 +152,7 @@ def test_normals_of_corners():
 
 
 def test_dual_quaternions_keep_lengths():
-    """Half way to a rotated joint, linear blending shortens an edge, dual quaternions do not."""
+    """Halfway to a rotated joint, linear blending shortens an edge, but dual quaternions do not."""
     options = {"indices": [0, 1], "weights": [0.5, 0.5], "each": 2, "constant": True}
     linear, _ = read(make_stage(**options), frame=4)
     dual, _ = read(make_stage(method="dualQuaternion", **options), frame=4)

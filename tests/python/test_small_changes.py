@@ -19,7 +19,8 @@ ROOT = Path(__file__).resolve().parents[2]
 CORE = "src/wavecomb"
 
 Change = dict[str, tuple[str, ...]]
-"""Maps a file to texts and their replacements in turn. The text of a new file is ""."""
+"""Maps a file to an alternating sequence of texts and their replacements. The text of a new file is
+""."""
 
 
 def header(name: str) -> str:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Strands that are thin in the image are replaced by fewer, wider ones."""
+"""Tests that fewer, wider strands replace strands that are thin in the image."""
 
 from __future__ import annotations
 

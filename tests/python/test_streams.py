@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Standard streams that are closed, full or missing, names that are not text, and Ctrl-C."""
+"""Tests standard streams that are closed, full or missing, non-text names, and Ctrl-C."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def stage(tmp_path: Path) -> Path:
 
 
 def shell(command: str, folder: Path, **options: object) -> subprocess.CompletedProcess[str]:
-    """Runs a line of bash. The exit code is that of the first command of a pipe."""
+    """Runs a line of bash. The exit code is the exit code of the first command of a pipe."""
     line = f"{command}; exit ${{PIPESTATUS[0]}}"
     return subprocess.run(
         ["bash", "-c", line], cwd=folder, capture_output=True, text=True, errors="replace",
@@ -171,7 +171,7 @@ def Shader "T" {
 @pytest.mark.slow
 @pytest.mark.parametrize("forced", [False, True])
 def test_no_name_forges_a_line(tmp_path: Path, forced: bool) -> None:
-    """Newlines in names of files and in text of a stage start no line of the output."""
+    """Newlines in file names and in a stage's text do not start new lines in the output."""
     folder = tmp_path / f"folder {FORGED}"
     folder.mkdir()
     stage = folder / "a.usda"
@@ -286,7 +286,7 @@ SCRIPT = f"#!{sys.executable}\nimport sys\nfrom wavecomb.cli import main\nsys.ex
 def interrupted_at(
     module: str, folder: Path, words: list[object], **options: object
 ) -> subprocess.CompletedProcess[str]:
-    """Runs a command that gets Ctrl-C when it imports a module."""
+    """Runs a command that receives Ctrl-C while importing a module."""
     (folder / "sitecustomize.py").write_text(PLANTED)
     env = {**os.environ, "PYTHONPATH": str(folder), "INTERRUPTED_AT": module}
     return subprocess.run(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Subdivision surfaces against closed forms and masks computed here."""
+"""Tests subdivision surfaces against closed forms and masks that this file computes."""
 
 import json
 import weakref

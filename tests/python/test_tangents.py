@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tangents interpolated over triangles, and normal maps on mirrored geometry, in images."""
+"""Tests interpolated tangents, and normal maps on mirrored geometry, in images."""
 
 from __future__ import annotations
 

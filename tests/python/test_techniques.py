@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Layers that split the beauty by sampling technique: bounces, light samples, light paths."""
+"""Tests layers that split the beauty by technique: bounces, light samples, light paths."""
 
 from __future__ import annotations
 

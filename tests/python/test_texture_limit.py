@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``--texture-limit`` without a texture store: which mip levels textures omit."""
+"""Tests ``--texture-limit`` without a texture store: the mip levels that textures omit."""
 
 import numpy as np
 import OpenImageIO as oiio

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Several sets of texture coordinates on one mesh."""
+"""Tests several sets of texture coordinates on one mesh."""
 
 import numpy as np
 from test_usd_material import surface, write_image

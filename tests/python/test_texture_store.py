@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``--texture-limit`` with a texture store: equal images, memory within the limit, errors."""
+"""Tests ``--texture-limit`` with a texture store: equal images, memory and errors."""
 
 import ctypes
 import errno
@@ -35,9 +35,9 @@ needs_store = needs("userfaultfd")
 
 @pytest.fixture(scope="module")
 def stage(tmp_path_factory):
-    """Nine squares that fill the image, with 12.6 MB of noise textures that also cut them out.
+    """Nine squares that fill the image, with 12.6 MB of noise textures that also control opacity.
 
-    Cut-outs read the finest level, so that rays access all of it.
+    Opacity is read from the finest level, so that rays access the whole finest level.
     """
     folder = tmp_path_factory.mktemp("textures")
     rng = np.random.default_rng(3)
@@ -75,7 +75,7 @@ def picture(stage, texture_limit=None, **options):
 
 @pytest.fixture(scope="module")
 def whole(stage):
-    """The image without a limit."""
+    """Image of the squares without a texture limit."""
     result = picture(stage)
     assert result.stats["texture_store"] is None
     assert len(np.unique(result.beauty)) > 1000
@@ -211,7 +211,7 @@ def no_memory_for_tiles():
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="numbers of system calls of x86_64")
 @pytest.mark.parametrize("limit", ["1", "2"], ids=["on the store's thread", "on the loader's"])
 def test_no_memory_for_a_tile_ends_the_render_in_one_line(stage, limit):
-    """With 1 MB all textures go to the file at once; with 2 MB the first one stays in memory."""
+    """At 1 MB, all textures go to the file at once; at 2 MB, the first one stays in memory."""
     done = subprocess.run(
         [sys.executable, "-m", "wavecomb", "render", stage, "-o", stage.parent / "o.exr", "--size",
          "64", "64", "--spp", "1", "--texture-limit", limit, "--isolate", "off"],
@@ -278,7 +278,7 @@ def Volume "Smoke" {
 
 @pytest.fixture(scope="module")
 def smoky(stage):
-    """The squares with 3.5 MB of smoke before them."""
+    """The squares with 3.5 MB of smoke in front of them."""
     cells = np.stack(np.meshgrid(*[np.arange(10)] * 3, indexing="ij"), -1).reshape(-1, 3)[:900]
     values = np.random.default_rng(1).random((900, 8, 8, 8), np.float32)
     vdb.write(stage.parent / "smoke.vdb", [{

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every test that `make test` leaves to `make test-long` has a representative in `make test`."""
+"""Tests that every test that only `make test-long` runs has a counterpart in `make test`."""
 
 from __future__ import annotations
 

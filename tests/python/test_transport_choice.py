@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Transport "auto": its choices, and independence of schedules."""
+"""Tests transport "auto": its choices, and their independence of schedules."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Triangulation of arbitrary polygons: results and run time."""
+"""Tests the triangulation of arbitrary polygons: results and run time."""
 
 import numpy as np
 import pytest
@@ -118,7 +118,7 @@ def test_faces_of_100000_corners_take_a_second(name):
 
 
 def test_large_concave_faces_are_covered_once():
-    """A comb of 8,000 corners, once too large for ear clipping."""
+    """A comb of 8,000 corners, which was once too large for ear clipping."""
     corners = comb(8000, np.random.default_rng(3))
     points = np.concatenate([corners, np.zeros((8000, 1))], axis=1).astype(np.float32)
     topology = module.triangulate(

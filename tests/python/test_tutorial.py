@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The commands of the tutorial and of the gallery run as printed."""
+"""Tests that the commands of the tutorial and of the gallery run as printed."""
 
 from __future__ import annotations
 

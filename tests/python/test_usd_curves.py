@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Curves and points: bases, wraps, widths, normals, colours, broken input."""
+"""Tests curves and points: bases, wrap modes, widths, normals, colours and broken input."""
 
 import itertools
 import time

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Draw modes of models: which proxy geometry is drawn, where, and for which models."""
+"""Tests draw modes of models: the proxy geometry that is drawn, where, and for which models."""
 
 import numpy as np
 import OpenImageIO

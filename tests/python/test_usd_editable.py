@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Open stages that are loaded repeatedly: known attributes, and shared data."""
+"""Tests open stages that are loaded repeatedly: editable attributes, and shared data."""
 
 import os
 import shutil
@@ -206,7 +206,7 @@ def test_a_colour_in_a_space_of_its_own_has_a_value(tmp_path):
 
 
 class Defaults:
-    """Records the defaults that the loader uses, in the role of ``openpbr.Inputs``."""
+    """Stand-in for ``openpbr.Inputs`` that records the defaults that the loader uses."""
 
     def __init__(self):
         self.found = {}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""IES profiles: symmetry, photometric types, invalid files."""
+"""Tests IES profiles: symmetry, photometric types and invalid files."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Native instances and point instancers: transforms and materials of the copies."""
+"""Tests native instances and point instancers: transforms and materials of the copies."""
 
 import numpy as np
 import pytest
@@ -268,7 +268,7 @@ def test_instancers_and_instances_nest_to_any_depth(tmp_path, depth):
 
 
 def test_colours_of_instances_reach_through_nested_ones(tmp_path):
-    """The innermost instancer with a colour determines it, also with indices and invisible ids."""
+    """Of nested instancers' colours, the innermost applies, also with indices and invisible ids."""
     text = f"""
     def PointInstancer "Outer" {{
         rel prototypes = [</Outer/Plain>, </Outer/Own>]

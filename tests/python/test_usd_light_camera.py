@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lights and cameras, and their defaults."""
+"""Tests lights and cameras, and their defaults."""
 
 import numpy as np
 import OpenImageIO as oiio
@@ -37,7 +37,7 @@ def test_colour_intensity_exposure_temperature(tmp_path):
 
 @pytest.mark.parametrize("kelvin", [4000, 5000, 6500, 8750, 10000, 11000, 13000, 15000])
 def test_colour_temperatures_are_those_of_black_bodies(kelvin):
-    """Planckian locus by Kim's cubic splines from 4000 K, also above 10,000 K."""
+    """Planckian locus from Kim's cubic splines for 4000 K and more, also above 10,000 K."""
     x = np.polyval([-3.0258469e9, 2.1070379e6, 0.2226347e3, 0.240390], 1 / kelvin)
     y = np.polyval([3.0817580, -5.87338670, 3.75112997, -0.37001483], x)
     from_xyz = np.linalg.inv(

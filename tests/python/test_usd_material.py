@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Materials: networks, textures, bindings, programs, MaterialX, display colours."""
+"""Tests materials: networks, textures, bindings, programs, MaterialX, display colours."""
 
 import zipfile
 
@@ -557,7 +557,7 @@ def test_brushed_metal_has_a_direction_without_a_texture(tmp_path, anisotropy, b
 
 
 def test_materialx_layers(tmp_path):
-    """Standard Surface inputs as in its published translation to OpenPBR; others are reported."""
+    """Standard Surface inputs follow its published translation to OpenPBR or are reported."""
     text = surface(
         """float inputs:sheen = 0.5
         float inputs:thin_film_thickness = 300

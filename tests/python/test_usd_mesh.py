@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Meshes: polygons, normals, primvars, subdivision, shapes."""
+"""Tests meshes: polygons, normals, primvars, subdivision and implicit shapes."""
 
 import numpy as np
 import pytest

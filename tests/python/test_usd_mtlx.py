@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX files in stages: composition, and messages about broken files."""
+"""Tests MaterialX files in stages: composition, and messages about broken files."""
 
 from __future__ import annotations
 
@@ -363,7 +363,7 @@ def test_damaged_files_never_crash(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["basic", "basicTextured"])
 def test_as_openusd_reads_it(name: str) -> None:
-    """Interfaces, graphs and values of materials equal those of OpenUSD's plug-in."""
+    """Materials have the same interfaces, graphs and values as with OpenUSD's plug-in."""
     folder = "usd/wg_test_assets/MaterialXTest"
     ours = open_stage(asset(f"{folder}/{name}.usda"))
     theirs = Usd.Stage.Open(str(asset(f"{folder}/{name}_flatten.usda")))

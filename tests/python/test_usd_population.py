@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Population of a stage: masks, session layers, purposes, payloads, inactive prims."""
+"""Tests the population of stages: masks, session layers, purposes, payloads, inactive prims."""
 
 import json
 from pathlib import Path
@@ -173,7 +173,7 @@ def test_the_command_takes_masks_and_session_layers(tmp_path):
 
 
 def test_what_is_drawn_at_all(tmp_path):
-    """Payloads are drawn, but not inactive, abstract or undefined prims or other purposes."""
+    """Payloads are drawn; inactive, abstract and undefined prims and other purposes are not."""
     (tmp_path / "load.usda").write_text(
         f'#usda 1.0\n(defaultPrim = "P")\ndef Xform "P" {{\n def Mesh "Paid" {{ {QUAD} }}\n}}\n'
     )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Bad input causes one clear error line, never a crash or a silently wrong image."""
+"""Tests that bad input causes one clear error line, never a crash or a wrong image."""
 
 import subprocess
 import sys

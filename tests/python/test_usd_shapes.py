@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Implicit shapes against closed forms: area, volume, normals, texture coordinates, extent."""
+"""Tests implicit shapes against closed forms, such as area, volume, normals and extent."""
 
 import math
 
@@ -92,7 +92,7 @@ def test_closed_forms(tmp_path, prim, body, area, volume, extent, hand):
 
 
 def test_normals_are_exact(tmp_path):
-    """The normals are those of the ideal surface, not of the triangles."""
+    """The normals are exact normals of the ideal surface, not of the triangles."""
     scene, _ = load(
         tmp_path,
         'def Sphere "S" { double radius = 3 }'

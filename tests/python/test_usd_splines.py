@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""NURBS, Hermite curves and tetrahedra against separate formulas, and unsupported cases."""
+"""Tests NURBS, Hermite curves and tetrahedra against formulas, and unsupported cases."""
 
 from itertools import pairwise
 
@@ -25,7 +25,7 @@ def listed(values):
 
 
 def cox_de_boor(i, order, t, knots):
-    """Evaluates a B-spline basis function by its definition. t is not a knot."""
+    """Evaluates a B-spline basis function by its definition. ``t`` must not be a knot."""
     if order == 1:
         return float(knots[i] <= t < knots[i + 1])
     total = 0.0
@@ -279,7 +279,7 @@ def test_one_bad_curve_is_left_out_alone(tmp_path, text, says):
 
 
 def test_parts_of_many_nurbs_curves(tmp_path, monkeypatch):
-    """Evaluating many segments in blocks gives the same points."""
+    """Evaluating many segments in blocks gives the same points as evaluating them at once."""
     text = two_nurbs()
     whole = load(tmp_path, text)[0].mesh("C")["positions"]
     monkeypatch.setattr("wavecomb.usd.geometry.strands._AT_ONCE", 1)

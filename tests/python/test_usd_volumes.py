@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""UsdVol volumes: fields, files, materials, transforms, invalid input."""
+"""Tests UsdVol volumes: fields, files, materials, transforms and invalid input."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The plug-in that reads and writes .vdb files: values, tiles, names, broken files."""
+"""Tests the plug-in that reads and writes .vdb files: values, tiles, names and broken files."""
 
 from __future__ import annotations
 
@@ -129,7 +129,10 @@ def test_tiles_come_as_bricks(tmp_path: Path) -> None:
 
 
 def test_tiles_of_all_sizes(tmp_path: Path) -> None:
-    """Tiles of 4096, 128 and 8 voxels per side. A brick inside a tile does not affect the rest."""
+    """Tiles of 4096, 128 and 8 voxels per side.
+
+    A brick inside a tile does not affect the rest of the tile.
+    """
     path = tmp_path / "a.vdb"
     made = noise(1)
     made["origins"][:] = (4096 + 128, 0, 0)

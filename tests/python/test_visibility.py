@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Visibility by kind of ray, holdouts and alpha."""
+"""Tests visibility by kind of ray, holdouts and alpha."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""AOVs of volumes: transmittance, depth of half opacity, scattered light, Cryptomatte."""
+"""Tests AOVs of volumes: transmittance, depth of half opacity, scattered light, Cryptomatte."""
 
 from __future__ import annotations
 

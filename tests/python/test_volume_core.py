@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Volumes of the core, added by SceneBuilder: closed forms, checks."""
+"""Tests the core's volumes, added by SceneBuilder: closed forms and argument checks."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def grid_of(voxels: Any, lo: float, hi: float) -> Any:
 
 
 def picture(builder: Any, *, spp: int, depth: int = 1) -> Any:
-    """Returns the mean colour along -z from (0, 0, 4), before a wall of radiance 1 at -2."""
+    """Returns the mean colour along -z from (0, 0, 4) to a wall of radiance 1 at z = -2."""
     wall = builder.add_material("emissive", emission=(1.0, 1.0, 1.0))
     corners = np.array([[-9, -9, -2], [9, -9, -2], [9, 9, -2], [-9, 9, -2]], np.float32)
     mesh = builder.add_mesh(corners, np.array([[0, 1, 2], [0, 2, 3]], np.uint32), material=wall)

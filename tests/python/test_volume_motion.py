@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Motion blur of volumes by velocity fields: closed forms, schedules, stages."""
+"""Tests motion blur of volumes by velocity fields: closed forms, schedules and stages."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def wind(speed: Any = SPEED) -> Any:
 
 
 def picture(builder: Any, spp: int, **more: Any) -> Any:
-    """Renders along -z before a wall of radiance 1, with an orthographic camera."""
+    """Renders along -z in front of a wall of radiance 1, with an orthographic camera."""
     wall = builder.add_material("emissive", emission=(1.0, 1.0, 1.0))
     corners = np.array([[-9, -9, -2], [9, -9, -2], [9, 9, -2], [-9, 9, -2]], np.float32)
     mesh = builder.add_mesh(corners, np.array([[0, 1, 2], [0, 2, 3]], np.uint32), material=wall)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Volumes inside glass: closed forms, schedules."""
+"""Tests volumes inside glass: closed forms, and equal images for all schedules."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ DENSE = np.array([0.4, 0.8, 1.2])
 
 
 def smoke(builder: Any, low: float, high: float, **more: Any) -> None:
-    """Adds a homogeneous volume across the image."""
+    """Adds a homogeneous volume between two depths, across the whole image."""
     builder.add_volume(np.eye(4), bounds=((-3, -3, low), (3, 3, high)), **more)
 
 

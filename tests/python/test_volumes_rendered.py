@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Volumes from file to image: in the sandbox, and compared with Arnold."""
+"""Tests volumes from file to image, in the sandbox, and in comparison with Arnold."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def Camera "Cam" {
 
 
 def test_a_slab_of_a_file_lets_through_what_it_should(tmp_path: Path) -> None:
-    """The transmittance matches 8 voxels of density 1.5, which falls to 0 at both ends."""
+    """The transmittance matches 8 voxels of density 1.5 whose density falls to 0 at both ends."""
     values = np.full((16, 8, 8, 8), 1.5, np.float16)
     cells = [[x, y, 0] for x in range(-2, 2) for y in range(-2, 2)]
     bricks = {"origins": np.array(cells, np.int32) * 8, "values": values}

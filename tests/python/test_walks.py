@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Subsurface random walks: colours of flat walls, closed forms, furnaces, schedules."""
+"""Tests subsurface random walks: colours of walls, closed forms, furnaces and schedules."""
 
 from __future__ import annotations
 

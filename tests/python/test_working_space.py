@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rendering in ACEScg: colours are converted to it, and back for display."""
+"""Tests renders in ACEScg: conversion of colours to ACEScg, and back for display."""
 
 import numpy as np
 import OpenImageIO as oiio

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A scene builder that records its calls and checks the preconditions of the native one."""
+"""A scene builder that records calls and checks the preconditions of the native scene builder."""
 
 from pathlib import Path
 

@@ -6,7 +6,7 @@
 
 The source tree is copied, one line of each fix is undone, and the program is built once with all
 faults, for scalar lanes. Each fault has a stage in which the other faults have no effect. The exit
-code is 0 if pairs.py finds all of them.
+code is 0 if pairs.py finds all faults.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Fault:
 
     Attributes:
         name: Description of the fault, for messages.
-        seed: Seed of the stage of pairs.py that reveals it.
+        seed: Seed of the stage of pairs.py that reveals the fault.
         changes: (file, text of the fix, text without the fix).
     """
 

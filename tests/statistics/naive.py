@@ -95,16 +95,16 @@ class Comparison:
         return replace(self, z=self.z[-3:], events=self.events[-3:])
 
     def is_fault(self, scenes: int) -> bool:
-        """Whether the difference exceeds chance, given the number of scenes tested."""
+        """Whether the difference is too large to be chance, given the number of scenes."""
         return self.worst > limit(self.z.size * scenes)
 
     def is_sure(self, scenes: int) -> bool:
         """Whether a difference exceeds both normal noise and the effect of a few rare bright paths.
 
         Welch's t takes the variance from the batches. Where a few paths carry most of the light, a
-        render that has found none of them has a small variance and the wrong mean. If both renders
-        expect the same number of such paths, all n found ones are in the same render with a
-        probability of 2^(1 - n).
+        render that has found none of these paths has a small variance and the wrong mean. If both
+        renders expect the same number of such paths, all n paths that were found are in the same
+        render with a probability of 2^(1 - n).
         """
         tests = self.z.size * scenes
         beyond = (np.abs(self.z) > limit(tests)) & (self.events > 1.0 - np.log2(level(tests)))

@@ -11,11 +11,11 @@ image mean by Welch's t. A comparison with |z| of 3.3 or more is repeated with 1
 times as many samples and other seeds. A difference is a fault if |z| is too large each time, at the
 level that Sidak's correction leaves of 1 % for all comparisons of a run.
 
-Where a few paths carry most of the light, z is not normal: a render that has found none of them has
-a small variance. A difference is then a fault only if it is larger than the chance effect of a few
-paths (``Comparison.is_sure``). Comparisons of smaller differences are repeated with ``FURTHER``
-times as many samples. If the difference is too large even then, the comparison is undecided. A run
-in which more than ``MOST_UNDECIDED`` of the stages have such comparisons fails.
+Where a few paths carry most of the light, z is not normal: a render that has found none of these
+paths has a small variance. A difference is then a fault only if it is larger than the chance effect
+of a few paths (``Comparison.is_sure``). Comparisons of smaller differences are repeated with
+``FURTHER`` times as many samples. If the difference is too large even then, the comparison is
+undecided. A run in which more than ``MOST_UNDECIDED`` of the stages have such comparisons fails.
 """
 
 from __future__ import annotations
@@ -121,11 +121,11 @@ class Result:
     tries: int = 1
 
     def is_fault(self, tests: int) -> bool:
-        """Whether the difference is too large for chance, given the number of comparisons."""
+        """Whether the difference is too large to be chance, given the number of comparisons."""
         return self.found is not None and self.found.is_sure(tests)
 
     def is_undecided(self, tests: int) -> bool:
-        """Whether the difference is too large for normal noise, but not for a few rare paths."""
+        """Whether a few rare paths, but not normal noise, can cause the difference."""
         return self.found is not None and is_open(self.found, tests)
 
 
@@ -229,7 +229,7 @@ class Renders:
         return self.trained[key]
 
     def sees_lights(self) -> bool:
-        """Whether the camera sees the shape of a light, even if only its dark back."""
+        """Whether the camera sees the shape of a light, or at least the dark back of the shape."""
         import wavecomb
 
         def seen(lights: str) -> Any:

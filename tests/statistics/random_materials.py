@@ -2,7 +2,8 @@
 """Materials of random scenes: any program, textures, presence, emission; with wide lobes.
 
 Lobes narrower than roughness 0.4 are left to the chi-square tests, since uniform directions hardly
-find them. Perfectly smooth lobes are included: the naive integrator follows each one explicitly.
+find such lobes. Perfectly smooth lobes are included: the naive integrator follows each one
+explicitly.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ PLACES = [(-1.05, 0.75, 0.2), (1.05, 0.75, -0.1), (0.0, 0.7, 1.1), (0.1, 1.5, -1
 
 @dataclass
 class RandomScene:
-    """A stage on disk and how to render it.
+    """A stage on disk, with the settings to render it.
 
     Attributes:
         stage: The file.

@@ -3,7 +3,7 @@
 
 The hash covers the recorded scene, settings, number of samples, seed, Mitsuba's version and
 variant, and the sources that translate a scene. Images are in build/references;
-`WAVECOMB_REFERENCES=0` renders each one anew, and `make clean` removes them.
+`WAVECOMB_REFERENCES=0` renders every image again, and `make clean` removes the images.
 """
 
 from __future__ import annotations

@@ -27,7 +27,7 @@ def passes(a: np.ndarray, b: np.ndarray, tolerance: float = 0.0) -> bool:
 
 @pytest.mark.parametrize("spread", [0.05, 0.3, 0.8])
 def test_accepts_noise(spread: float) -> None:
-    """At most one of 20 equal pairs fails, although their noise differs as between renderers."""
+    """At most one of 20 equal pairs fails, although the noise differs as between two renderers."""
     bad = sum(not passes(noise(k, spread), noise(100 + k, 0.6 * spread)) for k in range(20))
     assert bad <= 1
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Scenes with a known answer, rendered from USD text through loader and renderer."""
+"""Tests scenes with a known answer, from USD text through loader and renderer."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ WHITE = light("Dome")
 
 
 def test_diffuse_furnace_with_all_bounces(shot: Any) -> None:
-    """A white diffuse body in radiance 1 from all sides has radiance 1.
+    """A white diffuse body under radiance 1 from all sides has radiance 1.
 
     A faceted ball receives only the dome's light, so one bounce is sufficient.
     """
@@ -144,7 +144,7 @@ def test_clearcoat_makes_no_energy(shot: Any) -> None:
 
 
 def test_smooth_glass_keeps_all_energy(shot: Any) -> None:
-    """Furnace test of smooth glass: the radiance scaling 1 / eta^2 cancels where paths leave."""
+    """Furnace test of smooth glass: the scaling 1 / eta^2 cancels when paths leave the glass."""
     body = material("M", "dielectric", diffuseColor=(1, 1, 1), roughness=0.0, ior=1.5)
     picture = shot(AT_BALL, WHITE, body, sphere("B", "M", rings=48, smooth=True), max_depth=200)
     assert abs(picture.mean() - 1.0) < 2e-3
@@ -165,7 +165,7 @@ def floor_radiance(shot: Any, *lights: str) -> NDArray[np.float64]:
 def test_distant_light(shot: Any, angle: float) -> None:
     """A normalised distant light has irradiance E at normal incidence, and here E cos(40°).
 
-    The cosine averaged over a cone above the horizon is the cosine of its axis.
+    The mean cosine over a cone above the horizon is the cosine of the cone's axis.
     """
     sun = light(
         "Distant", colour=(2, 1, 3), transform=turned(-90 + 40), angle=angle, normalize=True
@@ -293,9 +293,7 @@ def test_exposure_intensity_and_colour(shot: Any) -> None:
 
 
 def test_point_light_shadow_edge(shot: Any) -> None:
-    """A point light behind the edge of a screen: light on one side only, with inverse square
-    falloff.
-    """
+    """A screen shadows half of the floor; the rest has a point light's inverse square falloff."""
     lamp = light("Sphere", colour=(10, 10, 10), transform=moved(0, 2, 0), radius=0.0)
     screen = quad("Screen", [(0, 1, 3), (3, 1, 3), (3, 1, -3), (0, 1, -3)], "M")
     view = camera((0, 0.9, 0), (0, 0, 0), half=0.2)

@@ -2,8 +2,8 @@
 """Emissive meshes and mesh lights with opacity: they contribute opacity times their emission.
 
 A floor below a square is lit by light samples, which aim at the square, and by bounces, which hit
-it where it is present. Each technique is also tested alone: only bounces find moving meshes, and
-only light samples find a mesh light of mode independent.
+the square where it is present. Each technique is also tested alone: only bounces find moving
+meshes, and only light samples find a mesh light of mode independent.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ def constant(opacity: float, threshold: float = 0.0) -> str:
 
 
 def textured(threshold: float = 0.0) -> str:
-    """Opacity by the red channel of mask.exr."""
+    """Opacity from the red channel of mask.exr."""
     text = constant(1.0, threshold).replace("float inputs:opacity = 1.0", "")
     connection = "float inputs:opacity.connect = </World/G/Map.outputs:r>"
     nodes = """def Shader "Map" {
@@ -105,7 +105,7 @@ def textured(threshold: float = 0.0) -> str:
 
 
 def driven() -> str:
-    """Opacity by a value graph: 1/2 + x, with x along the square in object space."""
+    """Opacity from a value graph: 1/2 + x, with x along the square in object space."""
     return f"""def Material "G" {{
         token outputs:mtlx:surface.connect = </World/G/Surface.outputs:out>
         def Shader "Surface" {{
@@ -256,7 +256,7 @@ def test_on_gloss(shot: Shot, roughness: float) -> None:
 
 
 def test_instances(shot: Shot) -> None:
-    """Two instances of one prototype, mirrored and rotated, one seen through the other."""
+    """Two instances of one prototype, mirrored and rotated; one is seen through the other."""
     mirrored = np.diag((-1.0, 1.0, 1.0, 1.0)) @ DOWN
     prims = f"""class "Lamps" {{
         {square(place=None)}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reproducibility: schedules do not change a bit of the image.
+"""Tests reproducibility: schedules do not change a bit of the image.
 
 The reference is the scalar reference integrator: depth first, one ray at a time.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Edits of faults.py, which reintroduce known faults: each matches the sources, and compiles."""
+"""Tests the edits of faults.py, which reintroduce faults: they match the sources and compile."""
 
 from __future__ import annotations
 

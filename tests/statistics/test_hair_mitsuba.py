@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hair compared with Mitsuba 3's `hair`: a fibre, a bundle and a head agree within noise.
+"""Tests hair against Mitsuba 3's `hair`: a fibre, a bundle and a head agree within noise.
 
 A fibre and a bundle are straight and end outside the image, because the two renderers model fibre
 ends differently. The hairs of the head end inside the image and taper to a tenth of their radius;
@@ -63,7 +63,7 @@ def line(a: Any, b: Any) -> Any:
 
 
 def stage(kind: str, roughness: tuple[float, float]) -> Any:
-    """Fibres between a front and a back light under a dim sky; kind "head" adds them to a ball."""
+    """Fibres between a front and a back light under a dim sky; for the kind "head", on a ball."""
     from recording import RecordingBuilder
 
     builder = RecordingBuilder()

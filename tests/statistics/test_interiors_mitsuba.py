@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Media inside meshes compared with Mitsuba 3's `volpathmis`: images agree within noise."""
+"""Tests media inside meshes against Mitsuba 3's `volpathmis`: images agree within noise."""
 
 from __future__ import annotations
 

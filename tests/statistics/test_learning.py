@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Learning changes noise but not the mean: each learned part, and all together.
+"""Tests that learning changes noise but not the mean: each learned part, and all together.
 
 Each stage is rendered with many seeds for each setting. Tiles of the image are compared by Welch's
 t, at a level that is Sidak's correction of 1 % over all stages, settings, tiles and channels of the
 long run. Skewed noise from rare bright paths inflates t, so a significant difference is tested
-again with new seeds, twice as many. A difference counts only if it is found again with the same
-sign, as a bias would be.
+again with new seeds, twice as many. A difference counts only if the second test finds it with the
+same sign, as with a bias.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shaped distant lights and lights without shadows, compared with closed forms."""
+"""Tests shaped distant lights and lights without shadows against closed forms."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Renders with light paths compared with camera paths only: AOVs, and adaptive sampling."""
+"""Tests AOVs and adaptive renders with light paths against camera paths only."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ LOOKS = (
 
 
 def corner(*prims: str) -> tuple[str, ...]:
-    """A floor, a back wall, a block and a ball; open, so that infinite lights reach them."""
+    """A floor, a back wall, a block and a ball in the open, where infinite lights reach them."""
     wall = quad("Wall", [(-2, 0, -1.5), (2, 0, -1.5), (2, 2.5, -1.5), (-2, 2.5, -1.5)], "Blue")
     return (
         *LOOKS,

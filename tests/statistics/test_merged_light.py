@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Caustics seen in mirrors and through glass, compared with closed forms and camera paths."""
+"""Tests caustics seen in mirrors and through glass against closed forms and camera paths."""
 
 from __future__ import annotations
 

@@ -138,7 +138,7 @@ def glossy(roughness: float) -> str:
 
 @pytest.mark.parametrize("mode", ["materialGlowTintsLight", "noMaterialResponse", "independent"])
 def test_both_halves_of_mis_tell_of_the_same_light(shot: Any, mode: str) -> None:
-    """On a glossy floor, both MIS techniques give the same as a rect light of equal radiance."""
+    """On a glossy floor, both MIS techniques give the image of a rect light of equal radiance."""
     tint = np.array((4, 1, 0.5))
     glow = 1 if mode != "materialGlowTintsLight" else np.array((0.5, 1, 2))
     mesh = lamp(f"color3f inputs:color = {numbers(tint)}", sync(mode), bound="G")
@@ -202,7 +202,7 @@ def test_textured_glow_is_tinted(shot: Any, tmp_path: Path) -> None:
 
 
 def test_instances_are_lights_of_their_own(shot: Any) -> None:
-    """Two normalised instances of one prototype are each divided by their own world-space area."""
+    """Each of two normalised instances of a prototype is divided by its world-space area."""
     inner = lamp(ALONE, "bool inputs:normalize = 1", place=None)
     big = np.diag((2.0, 2.0, 2.0, 1))
     prims = f"""class "Lamps" {{

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Wavecomb compared with Mitsuba 3's `path`: images agree within noise.
+"""Tests Wavecomb against Mitsuba 3's `path`: images agree within noise.
 
 Every stage is USD text that our loader reads; Mitsuba gets the arrays that our scene builder
 received. A wrong orientation would therefore be wrong in both renderers, so test_closed_forms.py
@@ -137,7 +137,7 @@ def test_disk_light(check: Check, recorded: Any) -> None:
 
 
 def test_instances_of_both(mitsuba: ModuleType, generated: Any) -> None:
-    """Mitsuba renders shape groups, which benchmarks use, and flattened copies alike."""
+    """In Mitsuba, shape groups, which benchmarks use, and flattened copies give equal images."""
     from mitsuba_bridge import PeerSettings
     from recording import record
 
@@ -166,7 +166,7 @@ def test_point_light(check: Check, recorded: Any) -> None:
 
 @pytest.mark.parametrize("angle", [0.0, 12.0])
 def test_distant_light(check: Check, recorded: Any, angle: float) -> None:
-    """Mitsuba has no distant light with an angle; a distant sphere replaces it."""
+    """Mitsuba has no distant light with an angle; there, a distant sphere replaces the light."""
     sun = light(
         "Distant", colour=(3, 2.5, 2), transform=turned(-50, 30), angle=angle, normalize=True
     )
@@ -229,9 +229,7 @@ def open_pbr(name: str, **inputs: Any) -> str:
 
 @pytest.mark.parametrize("lobe", ["metal", "rough metal", "glass", "rough glass"])
 def test_openpbr(check: Check, recorded: Any, tmp_path: Path, lobe: str) -> None:
-    """Metal corresponds to Mitsuba's principled with metallic 1, glass to its dielectric; see
-    test_gold.
-    """
+    """Metal equals Mitsuba's metallic principled, and glass its dielectric; see test_gold."""
     roughness = 0.2 if lobe.startswith("rough") else 0.0
     if lobe.endswith("metal"):
         body = open_pbr(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Random scenes compared with an integrator that shares no sampling code (naive.py)."""
+"""Tests random scenes against an integrator that shares no sampling code (naive.py)."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ def test_the_naive_integrator_is_right(module: Any, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("opacity", [0.5, 0.0])
 def test_glow_that_is_cut_out(module: Any, tmp_path: Path, opacity: float) -> None:
-    """Closed form: half of an emissive square gives half of its light."""
+    """Closed form: half of an emissive square gives half of the whole square's light."""
     corners = [(-1, 1, 1), (1, 1, 1), (1, 1, -1), (-1, 1, -1)]
     cut = material("G", "principled", emissiveColor=(1, 1, 1), diffuseColor=(0, 0, 0), opacity=1)
     whole = lit(module, tmp_path, cut, quad("Square", corners, "G"))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Random stages with all pairs of settings that must agree in expectation (pairs.py)."""
+"""Tests random stages with pairs of settings that must agree in expectation (pairs.py)."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ def test_every_enclosure_is_among_the_stages(tmp_path: Path) -> None:
 
 
 def test_every_choice_is_among_the_variants(tmp_path: Path) -> None:
-    """Each setting that must not change the mean differs from its plain value in a variant."""
+    """For each setting that must not change the mean, a variant uses a non-plain value."""
     scene = make_scene(0, tmp_path, enclosure=True)
     met: dict[str, set[Any]] = {}
     for seed in range(40):
@@ -122,7 +122,7 @@ def test_every_choice_is_among_the_variants(tmp_path: Path) -> None:
 
 
 def test_light_that_is_lost_is_a_fault(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A variant that is 5 % too dark is detected at once; an equal one passes."""
+    """A variant that is 5 % too dark is detected at once; a variant with an equal mean passes."""
     true = Renders.batches
 
     def darker(self: Renders, variant: Variant, more: int, first: int) -> Any:
@@ -217,7 +217,7 @@ def test_contributions_of_earlier_comparisons_count() -> None:
 
 
 def test_what_is_open_is_repeated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Undecided comparisons have a last turn, which decides or leaves them undecided."""
+    """Undecided comparisons get a last turn, after which they are decided or stay undecided."""
     turns: list[tuple[str, int]] = []
 
     def compare(self: Renders, variant: Variant, turn: int, contribution: Any = 0.0) -> Comparison:

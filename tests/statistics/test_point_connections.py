@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Techniques that connect the same points agree: closed forms, and pairs of settings."""
+"""Tests that techniques that connect the same points agree, also with closed forms."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def coarse_shade(folder: Path, *prims: str) -> Path:
 
 @pytest.mark.parametrize("weights", ["power", "calibrated"])
 def test_a_light_below_a_surface_is_the_walks_to_find(weights: str) -> None:
-    """The light is 100 mean free paths deep: nothing leaves, whatever light sampling prefers."""
+    """The light is 100 mean free paths deep, so no light leaves, however lights are selected."""
     stage = wavecomb.load(CASES / "light_in_subsurface.usda")
     found = mean(stage, spp=32, middle=True, light_weights=weights)
     assert found == pytest.approx(0.0, abs=1e-3)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Portals improve the sampling of a dome without changing the mean."""
+"""Tests that portals improve the sampling of a dome without changing the mean."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def test_portals_change_no_mean_and_lower_the_noise(shot: Any, tmp_path: Path) -
 
 @pytest.mark.slow
 def test_light_from_beside_portals_counts(shot: Any, fewer: int) -> None:
-    """A portal over half of the window, beside it, or facing away: the mean stays the same."""
+    """The mean is the same with a portal over half of the window, beside it, or facing away."""
     expected = shot(INSIDE, portal(), dome("Portal"), spp=2048).mean()
     away = moved(0.7, 0, 0) @ turned(y=180) @ moved(0, 0, HALF)
     for place in (moved(WINDOW, 0, HALF), moved(1.5, 0, HALF), away):

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cached reference images: content keys, images made once, and images made anew."""
+"""Tests the cache of reference images: keys, images that are reused, and images that are
+rendered."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Russian roulette changes noise and time but never the mean, even with absurd costs."""
+"""Tests that Russian roulette never changes the mean, even with absurd costs."""
 
 from __future__ import annotations
 

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A scene renders alike in millimetres and in kilometres: no self-intersection or leaks at any
-scale.
-"""
+"""Tests that scenes give equal images in millimetres and in kilometres, without leaks."""
 
 from __future__ import annotations
 
@@ -19,7 +17,7 @@ SCALES = (1e-3, 1e3, 1e5)
 
 
 def scaled(folder: Path, scale: float, place: tuple[float, float, float] = (0, 0, 0)) -> Any:
-    """A ball, a block and a light. The geometry itself is scaled, not its transform.
+    """A ball, a block and a light. The points of the geometry are scaled, not its transform.
 
     ``place`` moves everything by this offset before scaling.
     """

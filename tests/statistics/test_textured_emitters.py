@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Textured emission has the same mean for all sampling techniques.
+"""Tests that textured emission has the same mean for all sampling techniques.
 
 A floor is lit by a square that shows half of its texture: fine stripes, next to a much brighter
-part that a filtered lookup would blend in. Light samples read the finest level, so bounces must do
+half that a filtered lookup would blend in. Light samples read the finest level, so bounces must do
 the same although their ray cones are wide.
 """
 

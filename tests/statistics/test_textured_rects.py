@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rect lights with a texture: closed form, wave and reference integrator, and noise."""
+"""Tests textured rect lights: closed form, wave and reference integrator, and noise."""
 
 from __future__ import annotations
 

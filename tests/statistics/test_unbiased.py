@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Settings that must not change the mean: roulette, sampler, lobe sampling, filter."""
+"""Tests settings that must not change the mean: roulette, sampler, lobe sampling, filter."""
 
 from __future__ import annotations
 
@@ -84,7 +84,8 @@ def rel_mse(picture: Any, reference: Any) -> float:
 def test_owen_sobol_converges_faster(cornell: Any, beauty: Any, fewer: int) -> None:
     """Independent sampling has 1.3 times the error of Sobol at 16 samples, and 1.9 times at 256.
 
-    The measured ratios at 8 bounces are 1.6 and 2.4. With direct light only, they are 4.4 and 7.0.
+    The measured ratios at 8 bounces are 1.6 and 2.4. With direct light only, the ratios are 4.4 and
+    7.0.
     """
     reference = beauty(cornell, 32, 8192 // fewer, seed=900, sampler="sobol")
     gain = {}
@@ -115,7 +116,7 @@ def test_owen_sobol_converges_faster(cornell: Any, beauty: Any, fewer: int) -> N
     ],
 )
 def test_filters_keep_energy(tmp_path: Path, kind: str, width: float) -> None:
-    """A bright square on black: its total does not depend on the filter."""
+    """The total light of a bright square on black does not depend on the filter."""
     lamp = material("L", "emissive", emissiveColor=(4, 2, 8))
     corners = [(-0.3, -0.2, 0), (0.25, -0.2, 0), (0.25, 0.35, 0), (-0.3, 0.35, 0)]
     view = camera((0, 0, 5), (0, 0, 0), half=0.2)
@@ -145,8 +146,7 @@ def test_clamping_only_takes_away(cornell: Any, beauty: Any) -> None:
 
 @pytest.mark.slow
 def test_more_samples_extend_fewer(cornell: Any, beauty: Any) -> None:
-    """Sample k does not depend on the count: the first 4 of 8 samples are those of a 4-sample
-    render.
+    """Sample k does not depend on the count: the first 4 of 8 samples equal a 4-sample render.
 
     The noise of both renders has a correlation of sqrt(4 / 8), but 0 with another seed.
     """
@@ -164,7 +164,7 @@ def test_more_samples_extend_fewer(cornell: Any, beauty: Any) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("bounces", [1, 3])
 def test_cosine_beside_smooth_lobes(tmp_path: Path, beauty: Any, bounces: int, fewer: int) -> None:
-    """A delta lobe beside a diffuse one: cosine sampling accounts for its probability."""
+    """Beside a diffuse lobe, cosine sampling accounts for the probability of a delta lobe."""
     coat = {"clearcoat": 1.0, "clearcoatRoughness": 0.0}
     prims = [
         light("Dome", texture=write_sky(tmp_path)),

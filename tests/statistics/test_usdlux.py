@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The UsdLux suite compared with its public reference images, and tests of that comparison."""
+"""Tests the UsdLux suite against its public reference images, and tests that comparison."""
 
 from __future__ import annotations
 

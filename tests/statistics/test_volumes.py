@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Volumes compared with Mitsuba 3's `volpathmis`: images agree within noise."""
+"""Tests volumes against Mitsuba 3's `volpathmis`: images agree within noise."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ DEPTH = 12
 
 
 def smoke() -> Any:
-    """Densities of a lumpy ball, 0 at the edge of the grid, where Mitsuba's grids end."""
+    """Densities of a lumpy ball; 0 at the edge of the grid, since Mitsuba's grids end there."""
     rng = np.random.default_rng(4)
     at = np.stack(np.meshgrid(*[np.linspace(-1.0, 1.0, VOXELS)] * 3, indexing="ij"), axis=-1)
     ball = np.linalg.norm(at, axis=-1) < 0.85

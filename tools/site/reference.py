@@ -45,7 +45,7 @@ def pages() -> dict[str, str]:
 
 
 def cell(text: object) -> str:
-    """Escape text for a table cell, so that it neither ends the cell nor is markup."""
+    """Escape text for a table cell, so that the text neither ends the cell nor acts as markup."""
     plain = " ".join(str(text).split()).replace("|", "\\|")
     return plain.replace("<", "&lt;").replace("{", "&#123;").replace("*", "\\*")
 
@@ -307,5 +307,5 @@ def docstring(thing: Any) -> str:
 
 
 def escaped(line: str) -> str:
-    """Escape angle brackets, so that they are not markup."""
+    """Escape angle brackets, so that they do not act as markup."""
     return line.replace("<", "&lt;")

@@ -58,9 +58,9 @@ def generate(source: StageSource, path: Path) -> None:
 
 
 RECORDINGS = 3
-"""Number of renders, with different seeds, from which the oracle's costs are pooled."""
+"""Number of renders with different seeds whose measured costs are pooled for the oracle."""
 ORDERINGS = 12
-"""Number of renders, with different orders of materials, from which the best order is derived."""
+"""Number of renders with different orders of materials, from which the best order is derived."""
 
 Job = dict[str, Any]
 
@@ -88,11 +88,11 @@ class Jobs:
         return self._folder.path / "trace" / f"{config.recording_key()}{which}.json"
 
     def trace(self, config: Config) -> Path:
-        """Returns the file of recordings for the best and the worst order."""
+        """Returns the file with the recordings that determine the best and the worst order."""
         return self._folder.path / "trace" / f"{config.recording_key()}-orders.json"
 
     def image(self, run: Run) -> Path | None:
-        """Returns the file that keeps the run's image, or None if it is not kept."""
+        """Returns the file for the run's image, or None if the image is not kept."""
         keep = {"none": False, "first": run.repetition == 0, "all": True}[run.config.images]
         return self._folder.path / "images" / f"{run.run_id}.npy" if keep else None
 
@@ -180,7 +180,7 @@ def make_profile(jobs: Jobs, config: Config, scratch: Path) -> None:
 
 
 def _orderings(jobs: Jobs, config: Config, scratch: Path) -> dict[str, Any]:
-    """Records random orders of materials, and derives the best and worst order from them."""
+    """Records costs in random orders of materials, and derives the best and the worst order."""
     first = _run(jobs.recording(config, 0), config, scratch)
     names = [entry["name"] for entry in first["stats"]["materials"]]
     path = scratch / "trace" / ".ranks.json"
@@ -240,7 +240,7 @@ def check_peers(renderers: set[str]) -> None:
 
 
 def record(stage: Path) -> Path:
-    """Writes the arrays of a stage for other renderers to a folder beside the stage, once."""
+    """Writes a stage's arrays for other renderers to a folder beside it, unless they exist."""
     folder = stage.with_name(f"{stage.stem}-recorded")
     if folder.is_dir() and any(folder.iterdir()):
         return folder

@@ -117,14 +117,14 @@ def source_state() -> dict[str, Any]:
 
 
 def native_digest() -> str:
-    """Returns the SHA-256 of the native module, which keeps results of two builds apart."""
+    """Returns the SHA-256 of the native module, which distinguishes results of different builds."""
     from wavecomb import _core
 
     return hashlib.sha256(Path(str(_core.__file__)).read_bytes()).hexdigest()
 
 
 def frequency_mhz() -> float | None:
-    """Returns the mean frequency of the cores that the kernel reports now, in MHz, or None."""
+    """Returns the mean of the current core frequencies that the kernel reports, in MHz, or None."""
     values = [
         float(line.partition(":")[2])
         for line in _read(Path("/proc/cpuinfo")).splitlines()
@@ -151,7 +151,7 @@ def busy_seconds() -> float | None:
 
 
 def spin(threads: int) -> float:
-    """Measures the seconds of a fixed piece of work on ``threads`` threads at once.
+    """Measures the seconds of a fixed workload that runs on ``threads`` threads at once.
 
     Returns the smaller of two measured times.
     """
@@ -198,9 +198,10 @@ def _read(path: Path) -> str:
 
 
 MAX_OTHERS = 0.05
-"""Largest fraction of all cores' time that other processes may take during a run."""
+"""Largest fraction of all cores' time that other processes take during an undisturbed run."""
 MAX_SPIN = 1.10
-"""Largest time of the spin, a fixed CPU workload, relative to its time on the idle machine."""
+"""Largest time of the spin (a fixed CPU workload) of an undisturbed run, relative to its time on
+the idle machine."""
 MAX_NOISY_RUNS = 0.2
 MAX_VARIATION = 0.10
 
@@ -232,8 +233,8 @@ class Noise:
     Attributes:
         runs: Number of runs.
         noisy_runs: Number of disturbed runs.
-        variation: Median over configurations of the coefficient of variation of render_s, over
-            configurations with at least three runs; None without such configurations.
+        variation: Coefficient of variation of render_s, as the median over all configurations with
+            at least three runs; None without such configurations.
         noisy: Whether the timings need a warning.
         lines: Reasons for the warning.
     """

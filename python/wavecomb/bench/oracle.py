@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Oracle policies of suites, which bound the gain of any order by using recorded true costs.
 
-``oracle``        ``cost-benefit`` with true costs in place of learned ones.
-``oracle-best``   the order of material runs that is fastest according to the recordings.
-``oracle-worst``  the order of material runs that is slowest according to the recordings.
+``oracle``        the policy ``cost-benefit`` with true costs instead of estimated costs.
+``oracle-best``   the order of materials that is fastest according to the recordings.
+``oracle-worst``  the order of materials that is slowest according to the recordings.
 
 The oracles ``oracle-best`` and ``oracle-worst`` use the policy ``material`` with ranks in place of
 costs. This policy shades the materials of a program in ascending cost, so a cost file with ranks
 can produce any order. The cost of shading a hit depends on the material that was shaded just
-before, and an order of materials changes only this preceding material. The costs are therefore
-recorded in several renders with different orders of materials. The best order is the path through
-the materials of a program with the smallest expected cost.
+before, and the order of materials affects the cost only through this preceding material. The costs
+are therefore recorded in several renders with different orders of materials. The best order is the
+path with the smallest expected cost through the materials of a program.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def policy_of(settings: Mapping[str, Any]) -> dict[str, Any]:
 def pooled_costs(answers: list[dict[str, Any]]) -> Costs:
     """Returns true costs from recordings: measured ns over all timed records of a material.
 
-    A material that was never timed has its calibrated cost. Costs of textures are means over the
+    A material that was never timed gets its calibrated cost. Costs of textures are means over the
     recordings.
 
     >>> material = {"name": "M", "timed_records": 10, "ns_per_record": 50.0, "calibrated_ns": 9.0}
@@ -74,7 +74,7 @@ def pooled_costs(answers: list[dict[str, Any]]) -> Costs:
 
 
 def ranks(order: Sequence[str]) -> Costs:
-    """Returns costs that make the policy ``material`` shade in this order, within each program.
+    """Returns costs that make the policy ``material`` shade each program's materials in this order.
 
     >>> ranks(["b", "a"])
     {'materials': {'b': 1.0, 'a': 2.0}, 'textures': {}}
@@ -110,13 +110,13 @@ def recorded(order: Sequence[str], answer: Mapping[str, Any]) -> Recording:
 
 
 def best_orders(trace: Sequence[Recording]) -> dict[str, Any]:
-    """Computes the orders of material runs that are fastest and slowest according to the trace.
+    """Computes the orders of materials that are fastest and slowest according to recordings.
 
     For materials a, b of one program, cost(b after a) is the mean of b's measured ns per record
-    over the recordings in which b's run came directly after a's, and of one more value: b's mean
-    over all recordings. The additional value reduces the effect of pairs that were measured only
-    once. Each recording is scaled by its traversal time per ray, which removes drift of the
-    machine. An order takes the following time:
+    over the recordings in which b was shaded directly after a. This mean includes b's overall mean
+    as one additional value, which reduces the effect of pairs that were measured only once. Each
+    recording is scaled by its traversal time per ray, which removes drift of the machine. An order
+    takes the following time:
 
         sum over b of records(b) * cost(b after its predecessor)
 
@@ -163,7 +163,7 @@ def _scales(trace: Sequence[Recording]) -> list[float]:
 def _costs(
     trace: Sequence[Recording], scale: Sequence[float]
 ) -> tuple[dict[str, float], dict[tuple[str, str], float]]:
-    """Returns the mean ns per record of each material, and after each predecessor.
+    """Returns the mean ns per record of each material, overall and after each predecessor.
 
     The predecessor "" means that the material comes first in its program.
     """

@@ -24,7 +24,7 @@ from wavecomb.errors import WavecombError
 from wavecomb.options import expectation
 
 FRAMED = {"ray_order": "slot", "shadow_order": "slot", "roulette": "throughput"}
-"""Defaults of settings that have a column, for suites that do not set them."""
+"""Default values of settings that have a column, for suites that do not set these settings."""
 
 
 @dataclass(frozen=True)
@@ -71,9 +71,9 @@ class Config:
         return f"{stage}-{width}x{height}-{digest(of)}"
 
     def recording_key(self) -> str:
-        """Returns a key, equal for configurations with the same shading costs.
+        """Returns a key that is equal for configurations with the same shading costs.
 
-        The key depends on all settings but policy and roulette.
+        The key depends on all settings except policy and roulette.
         """
         left_out = ("policy", "roulette")
         of = {key: value for key, value in self.settings.items() if key not in left_out}
@@ -213,7 +213,7 @@ def _safe(text: str) -> str:
 
 
 def _resolved(path: Path, key: str, values: Sequence[Any], limits: Limits) -> list[Any]:
-    """Returns the values that this machine supports, each once; skips excess thread counts."""
+    """Returns the distinct values, without thread counts that this machine does not support."""
     found: list[Any] = []
     for value in values:
         number = _resolve(path, key, value, limits)
@@ -256,7 +256,7 @@ def _cache_mb(path: Path, text: str, limits: Limits) -> float:
 _SIZE = 160
 _SPP = 8
 _BYTES_PER_SECOND = 25e6
-"""Assumed rate at which loading reads and tiles textures, in bytes per second."""
+"""Assumed rate at which textures are read and tiled during loading, in bytes per second."""
 _TRIANGLES_PER_SECOND = 1.5e6
 """Assumed speed of reading meshes and building the BVH, in triangles per second."""
 
@@ -266,7 +266,7 @@ class Estimator:
     """Estimator of the duration of runs.
 
     Attributes:
-        start_s: Time in seconds of a process that renders almost nothing of a small stage.
+        start_s: Wall time in seconds of a process with a small stage, without the render time.
         rate: Samples per second and thread, by number of lanes. Other renderers are assumed to be
             as fast as Wavecomb.
         measured: Wall times in seconds of finished runs, by configuration.
@@ -278,7 +278,7 @@ class Estimator:
     _bias: list[float] = field(default_factory=list)
 
     def learn(self, config: Config, wall_s: float) -> None:
-        """Corrects the estimates of a configuration and of similar ones by a finished run."""
+        """Corrects the estimates of all configurations by the wall time of a finished run."""
         guess = self._guess(config)
         self.measured[config.name].append(wall_s)
         if guess > 0.0:
@@ -307,7 +307,7 @@ class Estimator:
 
 
 def _load_s(config: Config) -> float:
-    """Estimates by how many seconds loading a stage takes longer than loading a small stage."""
+    """Estimates the additional seconds for loading a stage, compared with a small stage."""
     if not config.source.scene:
         return 0.0
     from wavecomb.scenes import SceneOptions
@@ -323,7 +323,7 @@ def _load_s(config: Config) -> float:
 
 
 def calibrate(configs: Sequence[Config], cpus: Sequence[int]) -> Estimator:
-    """Measures renders of a small stage with each lane count in the plan; takes seconds."""
+    """Measures renders of a small stage with each lane count in the plan, within seconds."""
     from wavecomb.bench.process import run_worker
     from wavecomb.scenes import write_scene
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs jobs in separate processes, with hardware counters and the load of the machine."""
+"""Runs jobs in separate processes, and records hardware counters and the machine's load."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ EVENTS = {
     "llc_misses": ("LLC-load-misses", "cache-misses"),
     "branch_misses": ("branch-misses",),
 }
-"""Names of perf events for each column, in order of preference; CPUs support some of them."""
+"""Names of perf events for each column, in order of preference; a CPU supports only some."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Counters:
 
     Attributes:
         events: Name of the perf event for each available column.
-        missing: Reason for each column that cannot be counted.
+        missing: For each column that cannot be counted, the reason.
     """
 
     events: dict[str, str] = field(default_factory=dict)
@@ -60,7 +60,7 @@ def available(events: dict[str, tuple[str, ...]] = EVENTS) -> Counters:
 
 
 def _trial(event: str) -> str | None:
-    """Returns None if perf can count the event for a user's process, else the reason why not."""
+    """Returns the reason why perf cannot count an event for a user's process, or None if it can."""
     done = subprocess.run(
         ["perf", "stat", "-x", ",", "-e", f"{event}:u", "--", "true"],
         capture_output=True,
@@ -80,7 +80,7 @@ def _trial(event: str) -> str | None:
 
 
 class Session:
-    """Runs one worker under perf, which counts only while the worker has enabled it.
+    """Runs one worker under perf, which counts only while the worker has counting enabled.
 
     ``command`` is the prefix of the worker's command, and ``fds`` are file descriptors to pass to
     the worker. The value of ``job`` is passed to the worker as the entry ``perf`` of its job.
@@ -126,7 +126,7 @@ class Session:
 
 
 class Switch:
-    """Switch in the worker that turns perf's counting on and off; has no effect without perf."""
+    """Switch in the worker that turns perf's counting on and off. It has no effect without perf."""
 
     def __init__(self, job: dict[str, int] | None) -> None:
         self._job = job
@@ -193,7 +193,7 @@ def run_process(
 
 @dataclass
 class Lines:
-    """Output of a process: JSON objects that it printed, and its outcome with any failure."""
+    """Output of a process: the JSON objects that it printed, and its outcome or failure."""
 
     lines: list[Any]
     outcome: Outcome

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The result folder of a suite. A kill at any moment loses at most one run.
+"""The result folder of a suite. If the process is killed, at most one run is lost.
 
-``runs.jsonl`` is authoritative: each object is appended and flushed to disk before the row in
-``runs.csv``. Resuming a folder cuts off an incomplete last line and rebuilds ``runs.csv``.
-``runs.jsonl`` also holds all data without a column in ``runs.csv``, by ``run_id`` (docs/bench.md).
-In ``runs.csv`` an empty cell means "not measured" or "does not apply", never 0.
+``runs.jsonl`` is authoritative: the object of a run is appended to it and flushed to disk before
+the row is appended to ``runs.csv``. Resuming a suite removes an incomplete last line and rebuilds
+``runs.csv``. ``runs.jsonl`` also holds all data without a column in ``runs.csv``, by ``run_id``
+(docs/bench.md). In ``runs.csv`` an empty cell means "not measured" or "does not apply", never 0.
 """
 
 from __future__ import annotations
@@ -56,7 +56,8 @@ they add up to threads x render_s."""
 COUNTER_COLUMNS = (
     *("cycles", "instructions", "l1d_misses", "l2_misses", "llc_misses", "branch_misses"),
 )
-"""Hardware counters. Columns of counters are empty without kernel support; see machine.json."""
+"""Hardware counters. The columns are empty if the kernel does not support the counters; see
+machine.json."""
 
 with (Path(__file__).parent / "columns.csv").open(encoding="utf-8", newline="") as _file:
     COLUMNS = tuple(Column(**row) for row in csv.DictReader(_file))  # type: ignore[arg-type]
@@ -140,9 +141,9 @@ _PHASES = (
 
 
 def run_row(suite: Suite, run: Run, order: int, answer: Mapping[str, Any]) -> dict[str, Any]:
-    """Returns the columns known from the plan and the worker's answer.
+    """Returns the columns whose values come from the plan and the worker's answer.
 
-    The runner adds the state of the machine.
+    The runner adds the columns about the state of the machine.
     """
     config = run.config
     settings = config.settings
@@ -257,7 +258,7 @@ class ResultFolder:
         self._rewrite()
 
     def resume(self, suite: Suite) -> None:
-        """Opens the folder of the same suite and repairs incomplete files."""
+        """Opens the folder of an earlier execution of the suite and repairs incomplete files."""
         if not self.suite_toml.is_file():
             raise WavecombError(f"{self.path}: nothing to resume here; leave --resume out")
         if self.suite_toml.read_text(encoding="utf-8") != suite.text:
@@ -282,7 +283,7 @@ class ResultFolder:
         self.objects.append(entry)
 
     def machine(self) -> dict[str, Any]:
-        """Returns the contents of machine.json, or {} without that file."""
+        """Returns the contents of machine.json, or {} if there is no such file."""
         if not self.machine_json.is_file():
             return {}
         try:

@@ -48,8 +48,8 @@ class Options:
         repetitions: Overrides the suite's repetitions.
         only: Pattern for names of configurations.
         threads: Overrides the suite's thread count in runs that do not vary the thread count.
-        seed: Overrides the suite's seed of the order of runs.
-        time_limit_s: Starts no run that would end after this time, in seconds.
+        seed: Overrides the suite's seed for the order of runs.
+        time_limit_s: Time limit in seconds; a run that would probably end later is not started.
         resume: Whether to continue with the results in the folder.
         stages: Names of stages to run; empty means all.
     """
@@ -99,7 +99,7 @@ class Sitting:
         self.jobs = Jobs(self.suite, self.folder, self.cpus)
 
     def estimator(self) -> Estimator:
-        """Returns an estimator of run times, from results in the folder or else a calibration."""
+        """Returns an estimator of run times, based on earlier results or else on a calibration."""
         by_name = {config.name: config for config in self.configs}
         known = from_results(self.folder.objects, by_name)
         return known or calibrate(self.configs, self.cpus)
@@ -145,7 +145,7 @@ class Sitting:
     # ---- before the first run ------------------------------------------------------------------
 
     def _begin(self) -> None:
-        """Records the machine. Raises WavecombError if another build made the folder's results."""
+        """Records the machine. Raises WavecombError if the results come from another build."""
         document = self.folder.machine()
         state = machine.machine_state()
         if document and document.get("native_sha256") != state["native_sha256"]:

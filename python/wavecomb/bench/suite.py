@@ -25,7 +25,7 @@ from wavecomb.options import settings
 
 
 class Table:
-    """A TOML table whose keys are removed as they are read; keys that remain are unknown."""
+    """A TOML table whose keys are removed when they are read, so that unknown keys remain."""
 
     def __init__(self, path: Path, where: str, values: Mapping[str, Any]) -> None:
         self.path = path
@@ -70,11 +70,11 @@ class Table:
         return value
 
     def tables(self, key: str) -> list[tuple[str, Any]]:
-        """Takes the value of a key that is a table of tables; returns names and tables."""
+        """Takes the value of a key, which must be a table of tables; returns names and tables."""
         return list(self.take(key, dict, {}).items())
 
     def list_of_tables(self, key: str) -> list[Any]:
-        """Takes the value of a key that is a list of tables."""
+        """Takes the value of a key, which must be a list of tables."""
         entries = list(self.take(key, list, []))
         for entry in entries:
             if not isinstance(entry, Mapping):

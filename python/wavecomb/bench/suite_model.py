@@ -38,20 +38,20 @@ class Experiment:
     """Runs that are compared with one another.
 
     Attributes:
-        name: Name, unique in the suite.
+        name: Name of the experiment, unique in the suite.
         stages: Names of stages.
         renderers: Names from ``RENDERERS``.
         settings: Settings that all runs share.
         vary: For each setting, the values to run; all combinations are run.
-        stage_vary: For each option of generated stages, its values; all combinations are run.
-        cases: Cases: settings that change together. Each case is combined with all values of
+        stage_vary: Values of each varied option of generated stages; all combinations are run.
+        cases: Groups of settings that change together. Each case is combined with all values of
             ``vary``.
         case_names: Name of each case, or "" for a case without a name. Named cases are compared
             with the case named "off".
-        skip: Combinations that are not run: a combination is left out if it has all values of an
+        skip: Combinations that are not run. A combination is skipped if it has all values of an
             entry.
         factor: Key of ``vary`` or ``stage_vary`` over which a scaling curve is drawn, or "".
-        images: Repetitions that keep their image: "none", "first" or "all".
+        images: Repetitions whose images are kept: "none", "first" or "all".
         golden: Whether images are compared with a converged image.
     """
 
@@ -89,7 +89,7 @@ class Suite:
         text: Contents of the file.
         repetitions: Repetitions of each configuration.
         warm_up: Number of discarded runs of each stage before the first round.
-        seed: Seed of the order of runs.
+        seed: Seed for the random order of runs.
         golden: See ``Golden``.
         stages: Sources of stages by name.
         experiments: Experiments in the order of the file.

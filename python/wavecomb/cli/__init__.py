@@ -10,7 +10,7 @@ from typing import Any
 
 
 def _stop(number: int, frame: Any) -> None:
-    """Ends the process on Ctrl-C during imports, when there are no results to save yet."""
+    """Ends the process on Ctrl-C during imports, since there are no results to save yet."""
     os.write(2, b"stopped\n")
     os._exit(130)
 

@@ -68,20 +68,23 @@ def list_command() -> None:
     option("--resume", "flag", "Continue an interrupted suite with the results in DIR."),
     option(
         "--repetitions N", "count",
-        "Number of repetitions of each run.  [default: the suite's]",
+        "Number of repetitions of each run.  [default: the suite's number]",
     ),
-    option("--only GLOB", "text", "Run only configurations whose name matches."),
+    option("--only GLOB", "text", "Run only configurations whose name matches GLOB."),
     option(
-        "--stage NAME", "text", "Run only this stage; repeat for more.",
+        "--stage NAME", "text", "Run only the stage NAME (repeatable).",
         name="only_these", multiple=True,
     ),
-    option("--threads N", "count", "Number of render threads.  [default: the suite's]"),
+    option("--threads N", "count", "Number of render threads.  [default: the suite's number]"),
     option("--seed N", click.IntRange(min=0), "Seed of the random order of runs."),
-    option("--time-limit MINUTES", "positive", "Start no run that would end after this time."),
+    option(
+        "--time-limit MINUTES", "positive",
+        "Stop before the first run that would exceed this total time.",
+    ),
     option("--stages FOLDER", "path", "Folder with additional stages for the suite."),
     option(
         "--progress", click.Choice(["text", "json"]),
-        "How progress is shown; json also prints lines of JSON on standard output "
+        "Format of progress; json also prints one JSON object per line on standard output "
         "(docs/bench.md).",
         default="text", show_default=True,
     ),
@@ -142,7 +145,7 @@ def _event(name: str, /, **values: object) -> None:
 
 @contextlib.contextmanager
 def _stopped_by_sigterm() -> Iterator[None]:
-    """Makes SIGTERM end the suite as Ctrl-C does, so that the current run ends too."""
+    """Makes SIGTERM end the suite as Ctrl-C does, so that the current run also ends."""
 
     def stop(number: int, frame: object) -> None:
         raise KeyboardInterrupt
@@ -181,7 +184,7 @@ def _dry_run(sitting: object) -> None:
 @click.argument("folder", type=click.Path(), metavar="DIR")
 @option(
     "--markdown FILE.md", "path",
-    "Also write a Markdown page; its figures go to a folder beside it.",
+    "Also write the report as a Markdown page, with its figures in a folder beside it.",
 )  # fmt: skip
 def report_command(folder: str, markdown: str | None) -> None:
     """Write DIR/report.html and DIR/figures from the results in DIR."""

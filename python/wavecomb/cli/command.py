@@ -58,7 +58,7 @@ GROUPS: dict[str, tuple[str, str]] = {
         "isolate sandbox sandbox_read load_limit costs",
     ),
 }
-"""Title of a group -> names of its options in the short help, and of options in the full help only.
+"""For each group title, the options in the short help and those only in the full help.
 
 Unlisted load options belong to the group "Stage", unlisted settings to their group of
 ``SETTING_GROUPS``, and all other unlisted options to the group "This command".
@@ -106,7 +106,7 @@ def grouped(
 
 
 def shortened(text: str, width: int) -> str:
-    """Returns a help text in one line if possible: without its default, or its first part.
+    """Shortens a help text to one line, if possible, by dropping its default and then later parts.
 
     >>> shortened("Samples per pixel; the most with --noise.  [default: 64]", 45)
     'Samples per pixel; the most with --noise.'
@@ -169,7 +169,7 @@ def joined_sizes(words: Sequence[str]) -> list[str]:
 
 
 class SettingCommand(cloup.Command):
-    """Command with ``setting_options``. Loads the core only when its options are needed."""
+    """Command with ``setting_options``. Loads the core only when the options are needed."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         """Adds --help-all to the options."""
@@ -198,7 +198,7 @@ class SettingCommand(cloup.Command):
         return super().parse_args(ctx, joined_sizes(args))
 
     def format_params(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Writes the options in groups: the common ones, or all after --help-all."""
+        """Writes the options in groups: the common options, or all options after --help-all."""
         full = ctx.meta.get(_FULL, False)
         options = [one for one in self.get_params(ctx) if isinstance(one, click.Option)]
         options = [one for one in options if "--help" not in one.opts]
@@ -219,7 +219,7 @@ class SettingCommand(cloup.Command):
                 formatter.write_dl(section.definitions, col1_width=width)
 
     def format_help_text(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Writes the first paragraph of the description, or all of it after --help-all."""
+        """Writes the first paragraph of the description, or all paragraphs after --help-all."""
         text = inspect.cleandoc(self.help or "")
         if not ctx.meta.get(_FULL, False):
             text = text.partition("\n\n")[0]

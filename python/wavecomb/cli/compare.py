@@ -35,7 +35,7 @@ _MAPS = ("absolute", "signed", "flip-ldr", "flip-hdr", "z")
 @click.argument("b", type=click.Path())
 @add_options(
     option(
-        "--metric", click.Choice(_METRICS), "Image metric to compute; repeat for more.",
+        "--metric", click.Choice(_METRICS), "Image metric to compute (repeatable).",
         name="metrics", multiple=True,
     ),
     option(
@@ -59,11 +59,11 @@ _MAPS = ("absolute", "signed", "flip-ldr", "flip-hdr", "z")
     ),
     option(
         "--page FILE.html", "path",
-        "Write an HTML page with a wipe between A and B, and their difference.",
+        "Write an HTML page with a movable wipe line between A and B, and their difference.",
     ),
     option(
         "--wipe FILE.png", "path",
-        "Write an image that shows A left and B right of a vertical line.",
+        "Write an image that shows A to the left and B to the right of a vertical line.",
     ),
     option(
         "--at X", click.FloatRange(0, 1),
@@ -76,7 +76,7 @@ _MAPS = ("absolute", "signed", "flip-ldr", "flip-hdr", "z")
     option("--json", "flag", "Print JSON on standard output.", name="as_json"),
     option(
         "--tolerance X", Real(0),
-        "Exit with 0 if no colour channel differs by more than X.",
+        "Exit with code 0 if no colour channel differs by more than X.",
     ),
 )  # fmt: skip
 @isolate_option

@@ -92,7 +92,7 @@ def write_pair_page(
 
 
 def write_wipe(file: str, a: str, b: str, at: float, look: DisplayOptions) -> None:
-    """Writes a PNG with A left and B right of a vertical line.
+    """Writes a PNG with image A to the left and image B to the right of a vertical line.
 
     Raises:
         WavecombError: The images differ in size.

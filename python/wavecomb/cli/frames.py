@@ -25,7 +25,7 @@ def render_sequence(job: Job) -> tuple[Done | None, list[str]]:
 
     Raises:
         WavecombError: A frame failed. A frame cannot be rendered. The message names the frame;
-            earlier frames are written.
+            files of earlier frames are written.
         click.exceptions.Exit: The user stopped the render; completed frames are written.
     """
     frames = wanted = job.frames or ()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One-line errors with suggestions for misspelt options, exit codes and the version."""
+"""Handles one-line errors, suggestions for misspelt options, exit codes and the version."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Commands(click.Group):
         return list(NAMES)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Returns the command of a name, or None if there is none."""
+        """Returns the command with a given name, or None if there is no such command."""
         if cmd_name not in NAMES:
             return None
         command: click.Command = getattr(
@@ -118,7 +118,7 @@ class Commands(click.Group):
 
 
 def _output_of(words: Sequence[str]) -> str:
-    """Returns what a command prints on standard output: "result" or "messages"."""
+    """Returns which kind of text a command prints on standard output: "result" or "messages"."""
     names = [word for word in words if not word.startswith("-")]
     return "messages" if _WRITES_FILES & {tuple(names[:1]), tuple(names[:2])} else "result"
 

@@ -38,7 +38,7 @@ class Still:
     """Source of one image: loads a stage at one frame and renders it."""
 
     def __init__(self, job: Job, kept: Any = None) -> None:
-        """Creates the source; ``kept`` is an object to keep alive until the stage is loaded."""
+        """Creates the source, which keeps the object ``kept`` alive until the stage is loaded."""
         self._renderer: Any = None
         self._kept = kept
         self._job = job
@@ -76,7 +76,7 @@ class Still:
         return self._renderer.render(settings, *arguments, **named)
 
     def stats(self, result: Any, resumed_s: float) -> dict[str, Any]:
-        """Returns the statistics; a resumed render had taken ``resumed_s`` seconds before."""
+        """Returns the statistics; ``resumed_s`` are the seconds of the render that was resumed."""
         stage = self._job.options.stage
         return make_stats(result, stage=stage, loaded=self._loaded, resumed_s=resumed_s)
 
@@ -138,13 +138,13 @@ class Job:
     def run(
         self, shot: Shot, resumed: Checkpoint | None = None, *, keeps_stopped: bool = True
     ) -> Done:
-        """Loads the stage and renders one image. An image in bands is also written.
+        """Loads the stage and renders one image. Also writes the image if it is rendered in bands.
 
         Args:
             shot: Source of the image.
             resumed: Checkpoint to continue, or None.
-            keeps_stopped: Whether an image in bands is still written if the render is stopped after
-                its first sample.
+            keeps_stopped: Whether an image in bands is written even if the render is stopped, once
+                it has a sample.
         """
         options = self.options
         with self.reporter.loading(options.stage) as progress:
@@ -274,8 +274,8 @@ class Job:
         """Prepares checkpoints and previews.
 
         Returns:
-            Sinks that save checkpoints and previews; the state to resume, or None; and the seconds
-        rendered so far.
+            Three values: the sinks that save checkpoints and previews; the state to resume, or
+                None; and the seconds rendered so far.
         """
         options = self.options
         sinks: list[Sink] = []
@@ -331,7 +331,7 @@ class Job:
 
 
 class _NotKept(Exception):
-    """Exception: an image in bands was stopped, and its file must not be written."""
+    """Exception for a stopped render in bands whose image file must not be written."""
 
 
 def _broken_pixels(picture: Picture) -> int:

@@ -66,7 +66,7 @@ def isolate_option(command: F) -> F:
         metavar="DIR",
         expose_value=False,
         callback=_ask_reads,
-        help="Folder that the sandbox may read besides named files and libraries (repeatable).  "
+        help="Folder that the command may read besides its inputs and libraries (repeatable).  "
         "[default: all readable folders]",
     )(command)
     command = click.option(
@@ -76,8 +76,8 @@ def isolate_option(command: F) -> F:
         envvar="WAVECOMB_SANDBOX",
         expose_value=False,
         callback=_ask_sandbox,
-        help="Sandbox the child process with bubblewrap: no network, and only outputs are "
-        "writable.  [default: auto, if possible]",
+        help="Run the child process in a bubblewrap sandbox without network, where it can write "
+        "only its outputs.  [default: auto, on if possible]",
     )(command)
     command = click.option(
         "--memory-limit",
@@ -107,7 +107,7 @@ def isolation_options(command: F) -> F:
         metavar="S",
         expose_value=False,
         callback=_set_load_limit,
-        help="Time limit for USD to compose the stage, in seconds; 0 means none.  "
+        help="Time limit for USD to compose the stage, in seconds; 0 means no limit.  "
         "[default: 6, plus 1 for each MB of layers]",
     )(isolate_option(command))
 
@@ -135,7 +135,7 @@ def _load_option(row: Row) -> click.Option:
 
 
 def optional_stage(command: Any) -> Any:
-    """Adds the same options as ``stage_options``, with STAGE optional."""
+    """Adds the same options as ``stage_options``, but with an optional argument STAGE."""
     command = stage_options(command)
     for parameter in command.__click_params__:
         if parameter.name == "stage":
@@ -145,7 +145,7 @@ def optional_stage(command: Any) -> Any:
 
 @dataclass(frozen=True)
 class StageOptions:
-    """Values of the options that ``stage_options`` added, by the keys of their table rows."""
+    """Values of the options from ``stage_options``, by the keys of the rows in the option table."""
 
     values: Mapping[str, Any]
 
@@ -162,7 +162,7 @@ class StageOptions:
         return dict(self.values)
 
     def completed(self, before: dict[str, Any]) -> StageOptions:
-        """Sets options that the user did not give to their values in an earlier render."""
+        """Returns a copy in which omitted options have their values from an earlier render."""
         values: dict[str, Any] = {}
         for row in rows().values():
             key, mine, other = row.key, self.values[row.key], before.get(row.key)

@@ -35,11 +35,11 @@ class Prepared:
     """Render jobs that passed all checks.
 
     Attributes:
-        options: Options, with the frame of a single image filled into the file names.
+        options: Options, whose file names contain the frame if a single image is rendered.
         resumed: Checkpoint that the render continues, or None.
         jobs: A job for each render product.
-        opened: The open stage. It is held until the stage is loaded, so that USD reads its layers
-            only once.
+        opened: The open USD stage. It is kept until the stage is loaded, so that USD reads the
+            layers only once.
     """
 
     options: RenderOptions
@@ -104,7 +104,7 @@ def prepare(options: RenderOptions) -> Prepared:
 def _with_frame(options: RenderOptions) -> RenderOptions:
     """Fills the frame into the file names of a single image.
 
-    The frame comes from --frame, else from the resumed checkpoint, else it is the stage's first.
+    The frame comes from --frame, else from the resumed checkpoint, else it is the first frame.
     """
     names = [name for name in (getattr(options, field) for field in NAMED) if name is not None]
     if options.frames is not None or not any(map(has_place, names)):
@@ -121,8 +121,8 @@ def _peek(options: RenderOptions) -> tuple[list[ProductSettings], Any]:
     """Reads the stage's render settings.
 
     Returns:
-        The settings of each render product, and an object. As long as this object is alive, USD
-            keeps the layers and need not read them again when the stage is loaded.
+        The settings of each render product, and an object that keeps USD's layers in memory. While
+            this object is alive, loading the stage does not read the layers again.
     """
     import_usd()
     from wavecomb.usd import peek_products
@@ -162,7 +162,7 @@ def _learning(options: RenderOptions) -> Learning:
 
 
 def _sampling(options: RenderOptions, resumed: Checkpoint | None) -> dict[str, Any]:
-    """Returns the render settings that decide how many samples are taken."""
+    """Returns the render settings that determine the number of samples."""
     before = resumed.settings if resumed is not None else {}
     chosen = {
         name: value
@@ -208,7 +208,7 @@ def _earlier(settings: dict[str, Any], *, sized: bool) -> dict[str, Any]:
 
 
 def _check_deep(options: RenderOptions, kept: Iterable[str]) -> None:
-    """Raises WavecombError if only one of this and the resumed render uses --deep.
+    """Raises WavecombError if either this or the resumed render uses --deep, but not both.
 
     Args:
         options: Options of the command.
@@ -227,7 +227,7 @@ def _check_deep(options: RenderOptions, kept: Iterable[str]) -> None:
 
 
 def _check_settings(chosen: dict[str, Any]) -> None:
-    """Raises WavecombError for settings that are invalid for any stage.
+    """Raises WavecombError for settings that are invalid for every stage.
 
     The region and the memory are checked later, when the image size is known.
     """

@@ -89,7 +89,7 @@ class Product:
             raise WavecombError(f"{prim}: {error}; --size overrides it") from None
 
     def check_layers(self, aovs: Sequence[str]) -> None:
-        """Raises WavecombError if the EXR files cannot have these layers and options.
+        """Raises WavecombError if EXR files do not support these layers and options.
 
         Light groups are known only after the stage is loaded, so the file names of ``light_groups``
         are not checked here.
@@ -123,7 +123,7 @@ class Product:
                 self.check_place(str(file))
 
     def check_place(self, image: str) -> None:
-        """Raises WavecombError if a file would leave ``folder``, also through symbolic links."""
+        """Raises WavecombError if a file lies outside ``folder``, even through symbolic links."""
         if self.folder is None:
             return
         within, target = os.path.realpath(self.folder), os.path.realpath(image)
@@ -136,7 +136,7 @@ class Product:
 
 
 def plan_products(choices: Sequence[ProductSettings], options: RenderOptions) -> list[Product]:
-    """Returns the images that the stage names, one per render product; checks their files.
+    """Returns the images that the stage defines, one per render product, and checks their files.
 
     Raises:
         WavecombError: An image has no file name, or an option applies to one image only.
@@ -174,7 +174,7 @@ def _product(choice: ProductSettings, options: RenderOptions, is_single: bool) -
 
 
 def _check_several(products: Sequence[Product], options: RenderOptions) -> None:
-    """Raises WavecombError for options that apply to one image, and for equal file names."""
+    """Raises WavecombError for options that apply to one image only, or for equal file names."""
     single = {
         "--png": options.png, "--deep": options.deep, "--stats": options.stats_file,
         "--resume": options.resume, "--checkpoint": options.checkpoint,
@@ -200,7 +200,7 @@ def _check_several(products: Sequence[Product], options: RenderOptions) -> None:
 def checked_frames(
     options: RenderOptions, product: Product | None = None
 ) -> tuple[float, ...] | None:
-    """Returns the frames of a sequence, or None for a single image, after checking all its files.
+    """Returns the frames of a sequence, or None for a single image; checks all output files.
 
     Args:
         options: Options with the file names.

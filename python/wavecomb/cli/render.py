@@ -36,8 +36,8 @@ from wavecomb.terminal import say
 @isolation_options
 @option(
     "--tile I/N", "text",
-    "Render only tile I of N, to NAME.tile-I-of-N.exr, for `wavecomb farm assemble NAME.exr` to "
-    "join.", name="part",
+    "Render only tile I of N and write NAME.tile-I-of-N.exr; `wavecomb farm assemble NAME.exr` "
+    "joins the tiles.", name="part",
 )  # fmt: skip
 @render_options
 def render_command(part: str | None, **values: Any) -> None:

@@ -39,7 +39,7 @@ NAMED = (*WRITTEN, "image", "learn_from", "resume")
 
 
 class _AovOption(click.Option):
-    """Option --aov. Builds its help text on demand, because listing the AOVs loads the core."""
+    """Option --aov. The help text is built on demand, because listing the AOVs loads the core."""
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Returns the names of AOVs, groups and expressions that begin with ``incomplete``."""
@@ -98,7 +98,7 @@ class RenderOptions(FileOptions):
         image: The image that -o names, an EXR or a PNG; None if the stage names it.
         source: Options that load the stage.
         settings: Values of the render settings that were given.
-        whole: Name of a given option that needs the whole image in memory, or "" without one.
+        whole: Name of a given option that needs the whole image in memory; "" if there is none.
     """
 
     output: str | None = declared(
@@ -296,7 +296,7 @@ class RenderOptions(FileOptions):
 
 
 def _interval(options: dict[str, Any], name: str, files: Sequence[str], default: float) -> float:
-    """Returns the interval of an option in seconds; raises WavecombError without its files."""
+    """Returns an interval in seconds; raises WavecombError if no file that uses it is written."""
     seconds: float | None = options[name]
     if seconds is not None and all(options[file] is None for file in files):
         needed = " or ".join(f"--{file}" for file in files)
@@ -325,7 +325,7 @@ render_options = add_options(
     option(
         "--region X0 Y0 X1 Y1", click.INT,
         "Rectangle of pixels to render; X1 and Y1 are exclusive.  "
-        "[default: the render settings' data window, else all]", nargs=4,
+        "[default: the render settings' data window, else the whole image]", nargs=4,
     ),
     setting_options(),
 )  # fmt: skip

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Progress and results of ``wavecomb render``, as a bar, as lines of JSON or not at all."""
+"""Shows progress and results of ``wavecomb render`` as a bar, as lines of JSON or not at all."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ if TYPE_CHECKING:
 
 
 class Reporter:
-    """Base class of reporters, which prints nothing. Warnings and errors are shown elsewhere."""
+    """Base class of reporters, which prints nothing. Other code prints warnings and errors."""
 
     def loading(self, stage: str) -> contextlib.AbstractContextManager[LoadProgress | None]:
         """Shows that the stage is loading; yields a callback for loading progress, or None."""
         return contextlib.nullcontext()
 
     def begins(self, frame: str, number: int, count: int) -> None:
-        """Reports the start of a frame of a sequence, number ``number`` of ``count``."""
+        """Reports the start of frame ``number`` of the ``count`` frames in a sequence."""
 
     def ended(self, done: Done, files: Sequence[str]) -> None:
         """Reports that a frame of a sequence is written."""
@@ -46,7 +46,7 @@ class Reporter:
         """Reports a remark about a sequence."""
 
     def rendering(self) -> Silent:
-        """Returns the progress display of the render, a context manager."""
+        """Returns the progress display of the render, which is a context manager."""
         return Silent()
 
     def working(self, what: str) -> contextlib.AbstractContextManager[Any]:
@@ -156,7 +156,7 @@ class Done:
         stats: Statistics from ``make_stats``.
         costs: Cost profile for later renders.
         report: Loading report of the stage.
-        stopped: Number of the signal that stopped the render; None if it ran to its end.
+        stopped: Number of the signal that stopped the render; None if the render ran to its end.
         picture: Image to write; None if it was written band by band.
         files: Files that were written band by band.
     """

@@ -10,8 +10,8 @@ from wavecomb.cli.render_options import WRITTEN, RenderOptions
 from wavecomb.run.frame_names import fill, has_place, parse_frames
 
 MOST_NAMES = 100_000
-"""Largest number of file names given to the sandbox. For longer sequences, the sandbox gives access
-to their folder instead."""
+"""Largest number of files to which the sandbox gives access one by one. For longer sequences, it
+gives access to their folder."""
 
 
 def enter_to_render(
@@ -76,11 +76,11 @@ def _make_folders(names: Iterable[str]) -> None:
 
 
 def enter_to_read(outputs: Iterable[str | None], *, split: str | None = None) -> None:
-    """Restarts a command in the sandbox, given all of its output files.
+    """Restarts a command in the sandbox, with write access to all of its output files.
 
     Args:
         outputs: Files to write.
-        split: Output file that may become a file for each layer.
+        split: Output file that may be split into a file for each layer.
     """
     from wavecomb.run.isolation.outputs import Outputs
     from wavecomb.run.isolation.supervisor import enter

@@ -42,7 +42,7 @@ def _names(context: click.Context, parameter: click.Parameter, begun: str) -> li
     option("--dragon FILE", "path", "OBJ, PLY or USD mesh that replaces the built-in dragon."),
     option(
         "--triangles N", "count",
-        "Number of triangles of the built-in dragon, or of the stone field.  "
+        "Number of triangles of the built-in dragon or of the field of stones.  "
         "[default: 250000]",
     ),
     option(
@@ -51,7 +51,7 @@ def _names(context: click.Context, parameter: click.Parameter, begun: str) -> li
     ),
     option(
         "--texture-size N", click.IntRange(min=16),
-        "Largest texture size, in texels.  [default: 2048]",
+        "Width of the largest textures, in texels.  [default: 2048]",
     ),
     option(
         "--aspect X", "positive",
@@ -59,47 +59,51 @@ def _names(context: click.Context, parameter: click.Parameter, begun: str) -> li
     ),
     option(
         "--material NAME", "text",
-        "Material of scene cornell-dragon: gold, copper, glass or jade.  [default: gold]",
+        "Dragon material in scene `cornell-dragon`: gold, copper, glass, jade.  [default: gold]",
     ),
     option(
         "--materials N", "count",
-        "Number of materials of scenes spread and heavy.  [default: 16]",
+        "Number of materials in the scenes `spread` and `heavy`.  [default: 16]",
     ),
     option(
         "--programs N", click.IntRange(1, 5),
-        "Number of kinds of materials in scene spread, 1 to 5.  [default: 5]",
+        "Number of kinds of materials in the scene `spread`, 1 to 5.  [default: 5]",
     ),
-    option("--lights N", "count", "Number of lights in scene lights.  [default: 1000]"),
+    option("--lights N", "count", "Number of lights in the scene `lights`.  [default: 1000]"),
     option(
         "--lamps", "flag",
-        "Illuminate scenes mixed and dragon with a key light, a fill light and a dim dome.",
+        "Illuminate the scenes `mixed` and `dragon` with a key light, a fill light and a dim "
+        "dome.",
     ),
     option(
         "--strands N", "count",
-        "Number of hair strands in scenes fur and head.  [default: 100000]",
+        "Number of hair strands in the scenes `fur` and `head`.  [default: 100000]",
     ),
-    option("--splats N", "count", "Number of Gaussian splats in scene splats.  [default: 60000]"),
-    option("--capture FILE", "path", "PLY file of 3D Gaussian splats to use in scene splats."),
+    option(
+        "--splats N", "count",
+        "Number of Gaussian splats in the scene `splats`.  [default: 60000]",
+    ),
+    option("--capture FILE", "path", "PLY file of 3D Gaussian splats for the scene `splats`."),
     option(
         "--capture-linear", "flag",
-        "Read the colours of --capture as linear light, not as sRGB.",
+        "Read the colours in the file of --capture as linear values, not as sRGB.",
     ),
     option(
         "--voxels N", click.IntRange(min=16),
-        "Number of voxels along the longest edge in scenes smoke and clouds.  [default: 160]",
+        "Voxels along the longest edge of the grid in scene `smoke` or `clouds`.  [default: 160]",
     ),
     option(
         "--texture-mb X", Real(0),
-        "Memory of all textures of scenes spread and heavy, in MB.  [default: 16]",
+        "Total size of the textures in scene `spread` or `heavy`, in MB.  [default: 16]",
     ),
     option(
         "--shader-cost X", Real(1),
-        "Octaves of noise on the most expensive material of the scene `spread`; 1 means no noise.  "
-        "[default: 1]",
+        "Octaves of noise on the most expensive material of the scene `spread`; X = 1 gives no "
+        "noise.  [default: 1]",
     ),
     option(
         "--plain", "flag",
-        "Use only UsdPreviewSurface with the metallic workflow (any scene except heavy).",
+        "Use only UsdPreviewSurface with the metallic workflow (any scene except `heavy`).",
     ),
 )  # fmt: skip
 def scene_command(name: str | None, output: str | None, list_: bool, **options: Any) -> None:

@@ -26,7 +26,7 @@ _METAVARS = {"integer": "N", "number": "X", "text": "TEXT"}
 
 
 class SettingPlaceholder(click.Option):
-    """Placeholder for the options of settings in a command's list of parameters."""
+    """Placeholder in a command's list of parameters, for the options of settings."""
 
     def __init__(self, only: Iterable[str] | None) -> None:
         super().__init__(["--settings"], hidden=True)
@@ -45,10 +45,10 @@ class SettingPlaceholder(click.Option):
 
 
 def setting_options(only: Iterable[str] | None = None) -> Callable[[F], F]:
-    """Adds an option for each setting in ``only``, or all without a separate option.
+    """Adds an option for each setting in ``only``, or for all without a separate option.
 
-    The decorated command must be a ``SettingCommand`` (cli/command.py). The value of an option that
-    is not given is None.
+    The decorated command must be a ``SettingCommand`` (cli/command.py). An option that is not given
+    has the value None.
     """
 
     def decorate(command: F) -> F:
@@ -82,7 +82,7 @@ def _offered(row: Setting) -> Iterable[float]:
 
 
 class _Steps(click.Choice):
-    """Type of options that accept a few numbers, or a word for 0; help shows ``offered``."""
+    """Type of options that accept a few numbers or a word for 0; the help shows ``offered``."""
 
     def __init__(self, row: Setting, offered: Iterable[float]) -> None:
         super().__init__([row.zero, *(f"{step:g}" for step in row.steps)])

@@ -32,22 +32,22 @@ from wavecomb.terminal import say
     "--layer",
     default="",
     metavar="NAME",
-    help="Layer to show of EXR files.  [default: denoised if present, else beauty]",
+    help="Layer of EXR files to show.  [default: denoised if present, else beauty]",
 )
 @click.option(
     "--width", type=click.IntRange(16, 8192), metavar="PX",
-    help="Largest width of each image in the sheet or page, in pixels.  [default: 240; .html: "
+    help="Maximum width of each image in the sheet or page, in pixels.  [default: 240; .html: "
     "960]",
 )  # fmt: skip
 @click.option("--columns", type=click.IntRange(1), metavar="N",
               help="Number of image columns in the contact sheet.  [default: a landscape "
                    "layout]")  # fmt: skip
 @click.option("--fps", type=Real(0, above=True), default=24.0, metavar="X",
-              help="Frames per second at which the page plays.  [default: 24]")  # fmt: skip
+              help="Playback rate of the page, in frames per second.  [default: 24]")  # fmt: skip
 @click.option(
     "--title",
     metavar="TEXT",
-    help="Title of the page that plays the images.  [default: the first name]",
+    help="Title of the page that plays the images.  [default: the first argument's name]",
 )
 @click.option("--lossless", is_flag=True, help="Embed images in the page as PNG instead of JPEG.")
 @click.option(

@@ -22,12 +22,12 @@ SECONDS = {
     "load": "load", "build": "build", "render": "render", "denoise": "denoising",
     "write": "writing",
 }  # fmt: skip
-"""Timings in the statistics that add up to the time of an image, with their names in the summary.
+"""Timings in the statistics that add up to the time of an image, and their names in the summary.
 """
 
 
 def times_text(seconds: Mapping[str, float]) -> str:
-    """Returns the time of an image, and the times of its steps that took any time.
+    """Returns the time of an image, and the times of its steps, without steps of zero time.
 
     >>> times_text({"load": 0.5, "build": 0.1, "render": 61.0, "denoise": 0.0, "write": 0.2})
     '1 min 02 s: load 0.500 s, build 0.100 s, render 1 min 01 s, writing 0.200 s'
@@ -119,7 +119,7 @@ def _memory(parts: Mapping[str, int]) -> str:
 
 
 def _sampling_lines(stats: Mapping[str, Any]) -> list[str]:
-    """Returns lines about adaptive, timed, resumed and guided renders."""
+    """Returns lines about adaptive sampling, time limits, resuming and guiding."""
     from wavecomb.run.progress import count_text, time_text
     from wavecomb.run.stats import rendered_pixels
 
@@ -162,7 +162,7 @@ def _sampling_lines(stats: Mapping[str, Any]) -> list[str]:
 
 
 def _why_not_guided(stats: Mapping[str, Any]) -> str:
-    """Returns the reason for which ``--guiding auto`` has not measured its gain."""
+    """Returns the reason why ``--guiding auto`` has not predicted a gain."""
     transport = stats.get("transport") or {}
     given = stats["settings"].get("transport")
     if transport.get("chosen") == "light" or given in ("light", "bdpt"):

@@ -42,7 +42,7 @@ def submit(
 
     Args:
         stage: File of the stage.
-        output: File of the image. For several frames, with a placeholder such as shot.####.exr.
+        output: File of the image. For several frames, the name has a placeholder: shot.####.exr.
         frames: Frames, as in ``render_frames``; None renders a single image.
         tiles: "auto", or columns and rows such as "4x3".
         job: Folder to create; None puts it beside the output.
@@ -55,7 +55,7 @@ def submit(
         denoise: Whether images get the layer ``denoised``.
         file: Arguments half, compression, tile and split of ``Picture.save``.
         strict: Whether a missing file is an error.
-        maps: "FROM=TO": workers without the folder FROM look for its files in TO.
+        maps: Texts "FROM=TO". Workers that lack the folder FROM look for its files in TO.
         tries: Number of attempts for each task.
         hang_s: Time in seconds without progress after which a worker is restarted.
         **options: Fields of ``LoadOptions`` and of ``wavecomb.Settings``.
@@ -188,7 +188,7 @@ def assemble_job(folder: Folder) -> tuple[list[str], list[str]]:
     """Joins the tiles of all unfinished images in this process.
 
     Returns:
-        Files that were written, and a line for each image with missing tiles.
+        Files that were written, and a line of text for each image with missing tiles.
     """
     from wavecomb.farm.assembly import finish_image, is_finished, machine_of
 

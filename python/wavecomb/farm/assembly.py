@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Joins tiles to the image that one process would have rendered, bit for bit.
 
-This module also determines how much of a job is done.
+This module also reports the progress of a job.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ error checks than any tile took."""
 
 
 class NarrowBorder(WavecombError):
-    """Error that adaptive tiles had too narrow borders and must be rendered again.
+    """Error for adaptive tiles that must be rendered again because their borders were too narrow.
 
     Attributes:
         passes: Largest number of render passes that any tile took.
@@ -45,7 +45,7 @@ class NarrowBorder(WavecombError):
 
 
 def join(job: Job, image: int, parts: Iterable[RenderedTile]) -> Picture:
-    """Joins tiles, reading one at a time, into an image without denoising.
+    """Joins tiles into an image without denoising; only one tile at a time is in memory.
 
     Raises:
         InvalidTile: A tile is missing or damaged.
@@ -246,9 +246,9 @@ def finish_image(folder: Folder, image: int, machine: str, threads: int = 0) -> 
         threads: Number of threads for denoising.
 
     Returns:
-        A dictionary with ``files``, the files written. If tiles must be rendered first, it has
-            ``again``, their indices, and ``checks``, the number of error checks that their borders
-            must allow for, or 0.
+        A dictionary with ``files``, the files written. If tiles must be rendered first, the
+            dictionary also has the entries ``again``, the indices of these tiles, and ``checks``,
+            the number of error checks that their borders must allow for, or 0.
     """
     job = folder.job
     tasks = list(zip(job.tasks_of(image), job.rectangles(image), strict=True))

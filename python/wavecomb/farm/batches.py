@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Batches of work that one Dask task does."""
+"""Batches of work, each of which is done by one Dask task."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Batch:
     Attributes:
         tiles: Tiles to render; empty for work on a whole image.
         image: Index of the image to plan or to assemble, or -1.
-        attempt: Number that differs between repetitions of the same work.
+        attempt: Number that is different for each repetition of the same work.
         is_plan: Whether the work consists of the image's pilot renders.
     """
 
@@ -32,10 +32,10 @@ class Batch:
     is_plan: bool = False
 
     def work(self, checks: Mapping[int, int]) -> tuple[Callable[..., dict[str, Any]], str, Any]:
-        """Returns the function of ``farm.tasks`` to call, a name for keys, and its last argument.
+        """Returns the function in ``farm.tasks`` to call, its name in keys, and its last argument.
 
         Args:
-            checks: Number of error checks by image.
+            checks: Number of error checks of each image.
         """
         from wavecomb.farm.tasks import assemble_image, plan_image, render_tiles
 

@@ -21,7 +21,7 @@ from wavecomb.farm.tiling import has_pilots
 
 _TURN_S = 0.2
 _RETRY_S = 5.0
-"""Time between rescheduling of tasks that wait for a worker, in seconds."""
+"""Interval, in seconds, at which tasks that wait for a worker are rescheduled."""
 _NOBODY_S = 60.0
 """Time to wait for new workers when all workers have ended, in seconds."""
 _ASSEMBLY_PRIORITY = 1
@@ -176,8 +176,8 @@ class Run:
     def _retry_waiting(self) -> None:
         """Makes the scheduler reschedule tasks for which it found no suitable worker.
 
-        Dask itself reschedules such tasks only when a worker joins. A joining worker lacks the
-        required resource, because it announces its machine class a little later.
+        Dask itself reschedules such tasks only when a worker joins. When a worker joins, it still
+        lacks the required resource, because it announces its machine class a little later.
         """
         from wavecomb.farm.tasks import retry_unrunnable
 
@@ -237,10 +237,10 @@ class Run:
             self._put_back(batch)
 
     def _fetch(self, future: Any) -> None:
-        """Fetches the result of a finished task. Runs in a thread of Dask.
+        """Fetches the result of a finished task, on a thread of Dask.
 
         Workers hold results until the client requests them. If a worker ends before that, Dask
-        computes the task again, perhaps on a worker that only ``Cluster.check`` will start. For
+        computes the task again, perhaps on a worker that a later ``Cluster.check`` will start. For
         this reason only this thread may wait for results.
         """
         result = None

@@ -41,7 +41,7 @@ _ANSWER_S = 60.0
 _ASK_S = 10.0
 """Time between calls of squeue, in seconds."""
 _MAX_STARTS = 5
-"""Largest number of consecutive worker starts without a finished task."""
+"""Largest number of consecutive worker starts during which no task finishes."""
 _END_S = 5.0
 _SCRIPT = '#!/bin/sh\nexec "$@" --nthreads "${SLURM_CPUS_PER_TASK:-1}"\n'
 
@@ -177,7 +177,7 @@ class Workers:
 
 
 class _LocalWorkers(Cluster):
-    """Local workers in a process that is restarted when it ends."""
+    """Local workers, which share a process that is restarted when it ends."""
 
     def __init__(self, client: Any, what: str, words: list[str], log: Path) -> None:
         super().__init__(client, what)
@@ -277,8 +277,8 @@ def connected(
         where: The cluster.
         folder: Folder of the job. Workers on other machines read certificates from it.
         threads: Threads of each local worker; 0 means an equal share of the cores.
-        tries: Number of workers that may crash during a task before it fails. Does not apply to an
-            existing Dask cluster.
+        tries: Number of workers that may crash during a task before the task fails. Does not apply
+            to an existing Dask cluster.
         hang_s: Time in seconds without a heartbeat after which a worker is replaced. Does not apply
             to an existing Dask cluster.
         dashboard: Port of Dask's dashboard on this machine; None starts no dashboard.

@@ -98,6 +98,6 @@ class Folder:
 
 
 def write_json(path: Path, value: Any) -> None:
-    """Writes a small JSON file, never partially."""
+    """Writes a small JSON file atomically."""
     with replacing(path) as part:
         part.write_text(json.dumps(value, allow_nan=False) + "\n", encoding="utf-8")

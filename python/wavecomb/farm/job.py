@@ -69,8 +69,8 @@ class Shot:
 class StageFile:
     """A file that the stage needs, such as a layer, texture or IES profile.
 
-    If size (``bytes``) and time (``mtime_ns``) of a file are unchanged on a machine, the file is
-    not read to verify its hash.
+    If the size (``bytes``) and the time (``mtime_ns``) of a file are the same on a machine, the
+    hash is not verified.
     """
 
     path: str
@@ -92,7 +92,7 @@ class Job:
     """A farm job. Every field can be stored as JSON.
 
     Attributes:
-        stage: Name as given; a relative name is relative to ``folder``.
+        stage: File name as the user gave it; a relative name is relative to ``folder``.
         folder: Working folder of ``farm submit``.
         shots: See ``Shot``.
         images: For each image, the index of its shot, and its frame or None.
@@ -107,8 +107,8 @@ class Job:
         tries: Number of attempts for each task.
         hang_s: Time in seconds without progress after which a worker is restarted.
         strict: Whether a missing file is an error.
-        maps: Pairs of folders. Machines without the first folder of a pair look for its files in
-            the second.
+        maps: Pairs of folders. Machines that lack the first folder of a pair look for its files in
+            the second folder.
         isa: Instruction set that all workers must use; None allows any set that all workers share.
         version: Version of Wavecomb.
     """

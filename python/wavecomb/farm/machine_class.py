@@ -28,8 +28,8 @@ _OTHERS = re.compile(r"/(?!wavecomb\.)[^/]+\.libs/[^/]*$")
 def machine_class() -> str:
     """Returns the class of this machine.
 
-    The class consists of the instruction set and a hash of everything that affects results, and is
-    also the name of a Dask resource.
+    The class is a text with the instruction set and a hash of everything that affects results. The
+    text is also the name of a Dask resource.
     """
     from wavecomb import _core
 

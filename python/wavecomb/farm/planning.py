@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Completes a job before submission: its tiles, and its files with their hashes."""
+"""Completes a job before submission by adding its tiles, and its files with their hashes."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _UNKNOWN_WORKERS = 4
 
 
 def default_folder(output: str | None, stage: str, output_dir: str | None = None) -> str:
-    """Returns the folder of a job without --job, which is beside its images.
+    """Returns the default folder of a job, which is beside the images.
 
     >>> default_folder("out/shot.####.exr", "shot.usd")
     'out/shot.farm'
@@ -111,7 +111,7 @@ def shot_of(
     png: str | None = None,
     stats: str | None = None,
 ) -> Shot:
-    """Builds a shot of plain JSON values from ``Settings.to_dict`` and ``LoadOptions`` fields."""
+    """Builds a shot from ``Settings.to_dict`` and fields of ``LoadOptions``, as JSON values."""
     from wavecomb.run.stats import plain
 
     return Shot(plain(settings), tuple(aovs), plain(loading), output, png, stats)

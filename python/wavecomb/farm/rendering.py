@@ -90,7 +90,7 @@ class Renderer:
             task: The tile.
             path: File of the tile.
             machine: Class of this machine.
-            checks: Number of error checks that a border must allow for; 0 chooses a likely number.
+            checks: Number of error checks that a border must allow for; 0 means a likely number.
             plan: File that ``plan`` has written for the image. Without the file, the tile repeats
                 the pilot renders, with the same results.
             with_job: Whether the tile file also stores the job.
@@ -123,7 +123,7 @@ class Renderer:
     def plan(self, image: int, path: Path, machine: str) -> None:
         """Writes the results of an image's pilot renders to a file, unless it exists.
 
-        Pilot renders depend on the whole image only, so rendering one pixel is sufficient.
+        Pilot renders do not depend on the pixels to render, so rendering one pixel is sufficient.
 
         Args:
             image: Index of the image.
@@ -164,7 +164,7 @@ class Renderer:
     def _settings(
         self, image: int, shot: Shot, tile: Rectangle, checks: int
     ) -> tuple[Settings, Rectangle, int]:
-        """Returns a tile's settings, its rectangle with border, and the border's error checks."""
+        """Returns a tile's settings, bordered rectangle and the border's number of error checks."""
         from wavecomb import _core
 
         chosen = self._chosen(shot)

@@ -26,7 +26,7 @@ from wavecomb.path_maps import VARIABLE, Pair, here, mapped, use_maps
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _MIN_FREE = 1 << 16
-"""Free bytes below which a disk counts as full, because libraries do not report why a write
+"""A disk with fewer free bytes counts as full, because libraries do not report why a write
 failed."""
 _LOOK_S = 1.0
 _own_maps = os.environ.get(VARIABLE)
@@ -35,7 +35,7 @@ _kept: Any = None
 _current: Any = None
 """Dask worker and key of the current task, which any thread of this process may read."""
 _read: dict[str, str] = {}
-"""SHA-256 of each stage file that this process has read and USD may have cached."""
+"""SHA-256 of each stage file that this process has read and that USD may have cached."""
 
 
 class Progress:
@@ -54,7 +54,7 @@ class Progress:
         self.note()
 
     def wrote(self, path: str) -> None:
-        """Does nothing; tiles write no intermediate files (method of ``Reporter``)."""
+        """Does nothing, because tiles have no intermediate files (method of ``Reporter``)."""
 
     def __enter__(self) -> Progress:
         self.note()
@@ -124,20 +124,20 @@ def retry_unrunnable(dask_scheduler: Any) -> None:
 def render_tiles(
     folder: str, maps: list[Pair], job: str, machine: str, tiles: list[tuple[int, int, int]]
 ) -> dict[str, Any]:
-    """Renders the given tiles of a job, except finished ones.
+    """Renders the given tiles of a job, except tiles that are finished.
 
     Args:
         folder: Folder of the job, on the client's machine.
         maps: Path maps of the job.
         job: Expected ``Job.id``; a changed job in the folder is an error.
         machine: Machine class of this worker.
-        tiles: For each tile, the index of its image, its index and the number of error checks.
+        tiles: For each tile, its image index, its tile index and the number of error checks.
 
     Returns:
-        A dictionary: ``done``, image and tile of each finished tile; ``failed``, image, tile and an
-            error line of each tile that cannot be rendered; ``full``, the reason why no file can be
-            written, or ""; ``warnings``, lines; ``seconds``, the time taken; ``worker``, the
-            address of the worker.
+        A dictionary with the entries ``done`` (image and tile of each finished tile), ``failed``
+            (image, tile and an error line of each tile that cannot be rendered), ``full`` (the
+            reason why no file can be written, or ""), ``warnings`` (lines of text), ``seconds``
+            (the time taken) and ``worker`` (the address of the worker).
     """
     from wavecomb.farm.job import Task
     from wavecomb.farm.rendering import Stopped
@@ -175,8 +175,8 @@ def plan_image(folder: str, maps: list[Pair], job: str, machine: str, image: int
     """Writes the results of an image's pilot renders; takes the arguments of ``render_tiles``.
 
     Returns:
-        A dictionary: ``full``, the reason why no file can be written, or ""; ``worker``, the
-        address of the worker; ``warnings``, lines.
+        A dictionary with the entries ``full`` (the reason why no file can be written, or ""),
+            ``worker`` (the address of the worker) and ``warnings`` (lines of text).
     """
     from wavecomb.farm.rendering import Stopped
 
@@ -197,9 +197,9 @@ def assemble_image(
     """Joins the tiles of an image and writes its files; takes the arguments of ``render_tiles``.
 
     Returns:
-        A dictionary: ``again``, tiles that must be rendered first; ``checks``, the number of error
-            checks that their borders must allow for, or 0; ``full``, the reason why no file can be
-            written, or ""; ``worker``, the address of the worker.
+        A dictionary with the entries ``again`` (tiles that must be rendered first), ``checks`` (the
+            number of error checks that their borders must allow for, or 0), ``full`` (the reason
+            why no file can be written, or "") and ``worker`` (the address of the worker).
     """
     from wavecomb.farm.assembly import finish_image
 
@@ -265,7 +265,7 @@ def is_full(error: OSError, path: Path) -> bool:
 
 @contextlib.contextmanager
 def _noting_full_disk(out: dict[str, Any], path: Path, machine: str) -> Iterator[None]:
-    """Stores in ``out["full"]`` that the disk of ``path`` is full, and withdraws the worker."""
+    """Withdraws the worker if the disk of ``path`` is full, and stores why in ``out["full"]``."""
     try:
         yield
     except OSError as error:

@@ -40,7 +40,7 @@ does not exceed this number."""
 
 
 class InvalidTile(WavecombError):
-    """Error that a tile's file is missing, damaged or has another key.
+    """Error for a tile whose file is missing or damaged, or has another key.
 
     The tile must be rendered again.
     """
@@ -56,12 +56,12 @@ class RenderedTile:
         tile: Rectangle of the tile in the image, in pixels.
         layers: Arrays of the image by name, of shape (height, width) or (height, width, channels);
             names of AOVs begin with "aov.".
-        empty: For each layer, the value of a pixel without samples, if the image has such pixels.
+        empty: For each layer, the value of pixels without samples, if the image has such pixels.
         stats: Statistics from ``make_stats``.
         metadata: As in ``Picture.metadata``.
         manifests: As in ``Picture.manifests``.
         costs: As in ``Picture.costs``.
-        passes: Number of passes over the pixels; an adaptive render checks errors after each.
+        passes: Number of passes over the pixels; an adaptive render checks errors after each pass.
         checks: Number of error checks that the border around the tile allows for.
         machine: Class of the machine that rendered the tile.
         job: The job as JSON, for tiles outside of a job's folder.
@@ -93,11 +93,11 @@ def layers_of(picture: Picture) -> dict[str, NDArray[Any]]:
 
 @contextlib.contextmanager
 def replacing_quickly(path: Path) -> Iterator[Path]:
-    """Yields a temporary name beside ``path``, and renames it to ``path`` at the end.
+    """Yields a temporary file name beside ``path``, and renames the file to ``path`` at the end.
 
     Unlike ``output_file.replacing``, this function does not search the folder for leftovers of
-    killed processes, which is slow in folders with many files. The folder of tiles, with any
-    leftovers, is removed when its image is finished.
+    killed processes, since a search is slow in folders with many files. The folder of tiles, with
+    any leftovers, is removed when its image is finished.
     """
     if not path.parent.is_dir():
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -128,7 +128,7 @@ def save_tile(
     job: Mapping[str, Any] | None = None,
     replacing: Any = replacing_quickly,
 ) -> None:
-    """Writes a tile, never partially.
+    """Writes a tile atomically.
 
     Args:
         path: File to write.

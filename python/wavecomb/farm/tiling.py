@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Divides images into tiles of pixels (samples are never divided).
+"""Divides images into tiles. All samples of a pixel belong to one tile.
 
 This module also rejects settings that a farm cannot render or cannot divide into tiles.
 """
@@ -14,7 +14,7 @@ from typing import Any
 from wavecomb.errors import WavecombError
 
 Rectangle = tuple[int, int, int, int]
-"""Rectangle (x0, y0, x1, y1) in pixels of the whole image, without column x1 and row y1."""
+"""Rectangle (x0, y0, x1, y1) in pixels of the whole image, which excludes column x1 and row y1."""
 
 MAX_TILES = 9999
 """Largest number of columns or rows of an image."""
@@ -25,8 +25,9 @@ TILES_OF_A_WORKER = 4
 _CHECK_SAMPLES = 16
 """Samples per pixel between two error checks of the core (render/passes/pass_plan.cpp)."""
 _REACH = 4
-"""Distance in pixels over which one error check has an effect. It is 2 for the mean of errors over
-neighbouring pixels plus 2 because unfinished pixels mark their neighbours as unfinished."""
+"""Distance in pixels over which one error check has an effect. The distance is 2 for the mean of
+errors over neighbouring pixels, plus 2 because unfinished pixels mark their neighbours as
+unfinished."""
 _MIN_PILOT_SAMPLES = 2_000_000
 """Number of samples of an image from which pilot renders may decide (kMinAutoSamples in
 render/pilots/guiding_training.cpp)."""
@@ -109,8 +110,8 @@ def choose_tiles(
         regions: Regions of the images, one for each distinct size.
         pictures: Number of images.
         workers: Expected number of workers.
-        whole: Whether tiles cost more than they gain, because each would need a wide border or
-            would train a guiding field.
+        whole: Whether images should stay whole, because each tile would need a wide border or would
+            train a guiding field.
     """
     if workers < 2 or whole or pictures >= 2 * workers:
         return 1, 1
@@ -150,10 +151,10 @@ def max_error_checks(settings: Mapping[str, Any]) -> int:
 def border(settings: Mapping[str, Any], count: int) -> int:
     """Returns the width, in pixels, of the border to render around a tile.
 
-    An error check decides about a pixel from pixels up to 4 away. With a border of 4 pixels for
+    An error check of a pixel depends on pixels up to 4 pixels away. With a border of 4 pixels for
     each of ``count`` checks, pixels beyond the border cannot affect an adaptive tile. The layer
-    ``error`` needs 2 more pixels for its mean over neighbours. Renders without this layer need no
-    border.
+    ``error`` needs 2 more pixels for its mean over neighbours. Renders that are neither adaptive
+    nor have this layer need no border.
     """
     if settings.get("adaptive"):
         return _REACH * count + _WINDOW
@@ -199,7 +200,7 @@ def needs_whole(settings: Mapping[str, Any]) -> str:
 
 
 def is_better_whole(settings: Mapping[str, Any]) -> bool:
-    """Returns whether tiles cost much more than their pixels, so that images stay whole.
+    """Returns whether tiles add so much work that images should stay whole.
 
     Adaptive tiles need borders, and each tile of a render with light paths traces all light paths.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Process that hosts Dask workers, like ``dask worker`` with certificates from a private file.
+"""Process that hosts Dask workers, as ``dask worker`` does, with certificates from a private file.
 
 Dask's command would import modules from the working folder, and would read a file name with a line
 break as a certificate.

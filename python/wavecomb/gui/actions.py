@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Actions of the window: their texts, shortcuts, callbacks and places in menus."""
+"""Actions of the window: their texts, shortcuts, callbacks and positions in menus."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Entry:
 
 
 def make_action(entry: Entry, window: QWidget, viewport: QWidget) -> QAction:
-    """Creates the QAction, owned by the window or, if the shortcut is local, by the viewport."""
+    """Creates the QAction, whose parent is the window or, for a local shortcut, the viewport."""
     home = viewport if entry.local else window
     action = QAction(entry.text, home)
     action.setObjectName(f"action.{entry.name}")
@@ -105,7 +105,7 @@ class HistoryActions(QObject):
 
 
 class UnsavedMark(QObject):
-    """Updates the mark in the window's title that shows unsaved edits."""
+    """Updates the mark in the window's title that indicates unsaved edits."""
 
     def __init__(self, stack: QUndoStack, window: QWidget) -> None:
         super().__init__(window)

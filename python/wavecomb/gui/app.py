@@ -105,7 +105,7 @@ def run(
 
 
 def destroy(window: QWidget) -> None:
-    """Destroys a closed window immediately, instead of leaving it to Python's garbage collector.
+    """Destroys a closed window immediately, without waiting for Python's garbage collector.
 
     The Python objects of the window's panels remain, but their Qt objects no longer exist.
     """

@@ -24,7 +24,7 @@ Receive = Callable[[Any], None]
 
 
 class Mailbox:
-    """Queue of messages from any thread to one thread. The queue is independent of Qt."""
+    """Queue of messages that any thread may send to one thread. The queue is independent of Qt."""
 
     def __init__(self) -> None:
         self._letters: deque[tuple[int, Any]] = deque()
@@ -33,7 +33,7 @@ class Mailbox:
         self._writer.setblocking(False)
 
     def fileno(self) -> int:
-        """Returns a file descriptor that is readable while there are messages."""
+        """Returns a file descriptor that is readable while the queue has messages."""
         return self._reader.fileno()
 
     def put(self, address: int, letter: Any) -> None:
@@ -58,7 +58,7 @@ class Mailbox:
                 pass
 
     def take(self) -> tuple[int, Any] | None:
-        """Removes the oldest message and returns it with its receiver's address.
+        """Removes the oldest message and returns it with the address of its receiver.
 
         Returns None if there is no message.
         """

@@ -13,7 +13,7 @@ from PySide6.QtCore import QObject, QProcess, QTimer, Signal
 from wavecomb import processes
 
 KILL_MS = 8000
-"""Time between a stop request and the killing of a process that has not ended, in milliseconds."""
+"""Time in milliseconds after which a process that has not followed a stop request is killed."""
 
 
 class Command(QObject):
@@ -22,9 +22,9 @@ class Command(QObject):
     Signals:
         event(dict): The process printed a line with a JSON object on stdout.
         said(str): The process printed a line without a JSON object, on stdout or stderr.
-        finished(code, text, error): The process ended. ``code`` is the exit code and ``text`` all
-            of stdout. ``error`` is the last line of stderr if the process failed, else "". The exit
-            code of a stopped process is 130.
+        finished(code, text, error): The process ended. ``code`` is the exit code, and ``text`` is
+            the whole output on stdout. ``error`` is the last line of stderr if the process failed,
+            else "". The exit code of a stopped process is 130.
     """
 
     event = Signal(dict)

@@ -29,7 +29,7 @@ from wavecomb.gui.command import Command
 from wavecomb.gui.widgets import named
 
 Describe = Callable[[str], dict[str, Any]]
-"""Type of a function that describes a farm job for ``farm.from_json``, given the job's output file.
+"""Type of a function that takes an output file and describes a farm job for ``farm.from_json``.
 Raises WavecombError."""
 
 

@@ -86,7 +86,7 @@ def lay_out_rows(
 
 
 def compact(view: QTableView, name: str, title: str, tip: str) -> None:
-    """Sets up table rows of one text line. Long texts such as paths are shortened in the middle."""
+    """Limits table rows to one text line. Long texts such as paths are cut in the middle."""
     show_rows(view, name, title, tip)
     view.setWordWrap(False)
     view.setTextElideMode(Qt.TextElideMode.ElideMiddle)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Loads a stage for the window.
 
-The module is independent of Qt, because it runs on another thread than the window.
+The module is independent of Qt, because it does not run on the window's thread.
 """
 
 from __future__ import annotations

@@ -132,7 +132,7 @@ def log_folder() -> Path:
 
 
 def install_hooks(tell: Callable[[str], None]) -> Callable[[], None]:
-    """Installs hooks that report an internal error on any thread in one line and in a report file.
+    """Installs hooks that report internal errors of all threads, in one line and in a report file.
 
     Args:
         tell: Function that is called on the window's thread with the line that reports an error.

@@ -46,9 +46,9 @@ def package_of(library: str) -> str:
 
 
 def missing_libraries(plugin: str | None = None) -> list[str]:
-    """Returns the system libraries that Qt's X11 plug-in needs but that are not installed.
+    """Returns the system libraries that Qt's X11 plug-in needs and that are not installed.
 
-    The list is empty if this is unknown.
+    The list is empty if the missing libraries cannot be determined.
 
     Args:
         plugin: File of the plug-in; the default is the plug-in of PySide6.

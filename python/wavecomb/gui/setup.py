@@ -27,14 +27,14 @@ NOT_IN_PREVIEWS = (
 PREVIEW_DEPTH = 3
 
 _LIVE = {"guiding": "off", "transport": "path"}
-"""Defaults of live renders that differ from other renders. The first image should not wait for
-pilot renders."""
+"""Defaults of live renders that differ from those of other renders. The first image should not wait
+for pilot renders."""
 
 
 if TYPE_CHECKING:
 
     class _Rows:
-        """Type stub that declares a field for each row of the core's table of settings."""
+        """Declares a field for each row of the core's table of settings, for type checkers."""
 
         def __init__(self, **values: Any) -> None: ...
         def __getattr__(self, name: str) -> Any: ...

@@ -29,7 +29,7 @@ def from_display(colour: QColor) -> Colour:
 
 
 def swatch(colour: Colour, size: int, wide: int = 1) -> QIcon:
-    """Makes an icon filled with a colour, ``wide`` times as wide as high.
+    """Makes an icon filled with a colour; its width is ``wide`` times its height.
 
     A frame around the colour makes the icon visible on any background.
     """

@@ -33,7 +33,7 @@ _SERIES = {
 
 
 class _Theme(QObject):
-    """Object with the signal that is emitted when the colours of the theme change."""
+    """Object that emits a signal when the colours of the theme change."""
 
     changed = Signal()
 
@@ -59,7 +59,7 @@ def _follow() -> None:
 
 
 def on_change(call: Callable[[], None]) -> None:
-    """Calls a method of a QObject whenever the theme's colours change, while the object exists."""
+    """Calls a method of a QObject when the theme's colours change, while the object exists."""
     _the().changed.connect(call)
 
 

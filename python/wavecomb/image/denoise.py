@@ -24,8 +24,8 @@ def denoise(
 ) -> Array:
     """Denoises an image.
 
-    Albedo and normals are first denoised themselves. They then guide the image as noise-free
-    features, as Open Image Denoise recommends.
+    Albedo and normals are first denoised themselves. They then guide the denoising of the image as
+    noise-free features, as Open Image Denoise recommends.
 
     Args:
         beauty: Linear colours (height, width, 3). Values that are not finite are replaced.

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 def square_points(directions: NDArray[Any]) -> NDArray[np.float64]:
     """Maps unit vectors (..., 3) to points (u, v) in the unit square (..., 2).
 
-    The mapping is that of guiding/directions.h: P. Clarberg, "Fast Equal-Area Mapping of the
+    guiding/directions.h defines the same mapping: P. Clarberg, "Fast Equal-Area Mapping of the
     (Hemi)Sphere using SIMD", JGT 13(3) 2008.
 
     >>> square_points(np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])).tolist()

@@ -22,7 +22,7 @@ _HUE_BELOW, _HUE_ABOVE = 255.0, 70.0
 
 
 def colour_map(count: int = 256) -> NDArray[np.float32]:
-    """Returns a colour map (count, 3) from dark violet over red to light yellow, in linear Rec.709.
+    """Returns a colour map (count, 3) from dark violet via red to light yellow, in linear Rec.709.
 
     The OKLab lightness (Ottosson 2020) rises linearly, so that steps look uniform. The hue turns
     from violet to yellow. The chroma is the largest in the gamut, but at most 0.2.
@@ -32,7 +32,7 @@ def colour_map(count: int = 256) -> NDArray[np.float32]:
 
 
 def signed_colour_map(count: int = 257) -> NDArray[np.float32]:
-    """Returns a colour map (count, 3) from light blue over black to light orange.
+    """Returns a colour map (count, 3) from light blue via black to light orange.
 
     Lightness rises linearly from the middle, which is black, to both ends. People with any common
     colour vision deficiency can distinguish blue and orange.

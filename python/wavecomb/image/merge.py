@@ -24,8 +24,8 @@ SQUARED = ("variance",)
 SPREAD = ("error",)
 """Layers that contain standard errors, which are square roots of the variances of means."""
 _HITS = "_hits "
-"""Prefix of internal layers with the number of samples that hit a surface. They are needed for
-means over hits."""
+"""Prefix of internal layers with the number of samples that hit a surface. Means over hits need
+these layers."""
 
 
 def _sums() -> tuple[str, ...]:
@@ -47,7 +47,7 @@ class MergedImage:
         metadata: Attributes of the EXR header.
         manifests: For each Cryptomatte level, the object names and their ids.
         seeds: Seeds of all images that were merged.
-        window: Position of the pixels, as for ``write_exr``. None means that they fill the
+        window: Position of the pixels, as for ``write_exr``. None means that the pixels fill the
             displayed image.
     """
 
@@ -71,10 +71,11 @@ class _Source:
 def merge(paths: Sequence[str | os.PathLike[str]]) -> MergedImage:
     """Merges images pixel by pixel, weighted by their sample counts.
 
-    Sample counts and costs are added. Variances and errors are combined to those of the merged
-    image. Cryptomatte coverage is weighted like colours, and the largest ranks are kept. Depths
-    that are not finite are ignored. Position, texture coordinates and ids belong to single samples,
-    so they come from the first image with a sample in the pixel. The denoised layer is left out.
+    Sample counts and costs are added. Variances and errors become the variances and errors of the
+    merged image. Cryptomatte coverage is weighted like colours, and the largest ranks are kept.
+    Depths that are not finite are ignored. Position, texture coordinates and ids belong to single
+    samples, so they come from the first image with a sample in the pixel. The denoised layer is
+    left out.
 
     >>> merge(["a.exr", "b.exr"]).layers["samples"].max()  # doctest: +SKIP
     128.0

@@ -22,7 +22,7 @@ LAYER_EDGE = 360
 class Rendered(Protocol):
     """Interface of ``wavecomb.Picture``.
 
-    The class itself cannot be imported, since its module imports this one.
+    This module cannot import the class, since the module of the class imports this one.
     """
 
     @property

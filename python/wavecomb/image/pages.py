@@ -94,7 +94,7 @@ class Pair:
     """Pair of images on a page, with lines of description.
 
     Attributes:
-        name: Name of both images; "" if the title of the page contains it.
+        name: Name of both images; "" if the title of the page already contains the name.
         facts: Lines of plain text that describe the pair.
         a: Image A as 8-bit sRGB values (height, width, 3).
         b: Reference image B, with the same size as A.

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from wavecomb.image.files.image import Transfer
 
 NOWHERE = (0.0, 0.0, 0.0)
-"""World position of the scene origin, for scenes that use world coordinates."""
+"""World position of the scene's origin if the scene uses world coordinates."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -32,8 +32,8 @@ class Picture:
 
     Attributes:
         beauty: Linear colours (height, width, 3) in Rec.709, or in the stage's working space.
-        albedo: Albedo (height, width, 3). None if it was not requested, as for ``normal`` and
-            ``depth``.
+        albedo: Albedo (height, width, 3). This attribute, ``normal`` and ``depth`` are None if they
+            were not requested.
         normal: Normals (height, width, 3) in world space.
         depth: Depth (height, width) along the camera's axis; infinite for pixels without a hit.
         samples: Number of samples of each pixel, with shape (height, width).
@@ -328,8 +328,8 @@ def in_world(
 ) -> dict[str, NDArray[np.float32]]:
     """Converts positions in the AOVs to world space, as exactly as float32 permits.
 
-    Pixels without a hit keep the value 0. In a scene with another origin than the world, no surface
-    has this position.
+    Pixels without a hit keep the value 0. If the scene's origin is not the world's origin, no
+    surface has this position.
     """
     if "position" not in aovs or not any(origin):
         return aovs

@@ -19,8 +19,7 @@ GUIDES = ("guide_albedo", "guide_normal")
 glass."""
 ERRORS = ("error", "variance")
 DEEP = "deep"
-"""AOV of the deep image, which the option ``--deep`` writes to a separate file, not to a layer.
-"""
+"""AOV of the deep image, which the option ``--deep`` writes to a separate file, not to a layer."""
 LIGHT = "light_"
 
 
@@ -35,13 +34,13 @@ class Aov:
         letters: Letters of the channel names in files, such as "XYZ". "" means that channels are
             numbered or that there is one channel.
         content: Meaning of the AOV's values: "light", "colour", "direction", "id", "exact" (values
-            that lossy compression would make useless), "magnitude" (a logarithmic scale displays
-            it best) or "value".
+            that lossy compression would make useless), "magnitude" (best displayed on a logarithmic
+            scale) or "value".
         kind: How the samples of a pixel are combined: "mean", "mean_of_hits", "nearest",
             "coverage", "groups", "sum" or "median".
-        source: What changes the value: "hit", "vertex", "guide", "light", "technique" (light that
-            some techniques have found), "time" or "bounce".
-        title: Title of the layer in the window; "" if the window does not offer it.
+        source: What changes the value: "hit", "vertex", "guide", "light", "technique" (light found
+            by certain sampling techniques), "time" or "bounce".
+        title: Title of the layer in the window; "" if the window does not offer the layer.
     """
 
     name: str
@@ -127,7 +126,7 @@ def of_kind(kind: str) -> tuple[str, ...]:
 
 @cache
 def techniques() -> tuple[str, ...]:
-    """Returns the names of the AOVs with the light that some techniques have found.
+    """Returns the names of the AOVs with the light that certain sampling techniques find.
 
     >>> techniques()
     ('by_bounces', 'by_light_samples', 'by_light_paths')
@@ -139,7 +138,7 @@ def techniques() -> tuple[str, ...]:
 def names() -> tuple[str, ...]:
     """Returns the names of all AOVs.
 
-    The name "light_NAME", which selects one light group, is valid in addition.
+    Another valid name is "light_NAME", which selects one light group.
 
     >>> names()[:3]
     ('beauty', 'albedo', 'normal')

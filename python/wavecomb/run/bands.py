@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Renders an image in bands of rows, from top to bottom, if it is too large for the memory.
+"""Renders images that are too large for the memory in bands of rows, from top to bottom.
 
 A pixel's value does not depend on which other pixels are rendered, so bands are bit-identical to
 rows of the whole image. Denoising, adaptive sampling and checkpoints need all pixels at once, so
-they are not available.
+bands do not support them.
 """
 
 from __future__ import annotations

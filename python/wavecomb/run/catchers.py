@@ -76,7 +76,7 @@ def with_catcher_shadows(
 
     Args:
         picture: Image of the main render, without catchers but with the AOV ``alpha``.
-        render: Function that loads the stage with the given load options and renders it with
+        render: Function that loads the stage with the given load options and renders the stage with
             ``catcher_settings``.
     """
     lit, bare = (_light_of(render(how)) for how in PASSES)
@@ -96,7 +96,7 @@ def with_shadows(
     lit: NDArray[np.float64],
     bare: NDArray[np.float64],
 ) -> NDArray[np.float32]:
-    """Adds the shadows on catchers to alpha, in proportion to how dark they are.
+    """Adds the shadows on catchers to alpha, in proportion to the darkness of the shadows.
 
     Args:
         alpha: Alpha of all objects other than catchers. An object behind a catcher is not counted

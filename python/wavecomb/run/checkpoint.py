@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Checkpoints, from which a stopped render can continue.
 
-The result is identical to that of an uninterrupted render.
+The result is identical to the result of an uninterrupted render.
 
 A checkpoint is an uncompressed NumPy archive (.npz). It contains ``header``, which is JSON as
 bytes, and the arrays of ``Snapshot.state()``. A checkpoint is first written under a temporary name,
-and renamed when it is on disk. A complete file therefore exists at any time. Checksums in the
-archive detect damage.
+and gets its final name when it is on disk. A complete file therefore exists at any time. Checksums
+in the archive detect damage.
 """
 
 from __future__ import annotations
@@ -121,7 +121,7 @@ def _fingerprint(scene: Scene, settings: Settings) -> dict[str, str]:
 def save_checkpoint(
     path: str | os.PathLike[str], header: Mapping[str, Any], state: Mapping[str, Any]
 ) -> None:
-    """Writes a checkpoint, which gets its file name only when it is complete and on disk."""
+    """Writes a checkpoint. The file gets its name only when it is complete and on disk."""
     write_archive(path, header, state, durable=True)
 
 
@@ -248,7 +248,7 @@ def check_fits(checkpoint: Checkpoint, header: Mapping[str, Any]) -> None:
 
 
 def build_note(checkpoint: Checkpoint, header: Mapping[str, Any]) -> str | None:
-    """Returns a warning if another build wrote the checkpoint, as the last bits may then differ."""
+    """Returns a warning if another build wrote the checkpoint, since the last bits may differ."""
     for key in ("version", "library"):
         if checkpoint.header[key] != header[key]:
             return (
@@ -259,7 +259,7 @@ def build_note(checkpoint: Checkpoint, header: Mapping[str, Any]) -> str | None:
 
 
 def _take_more_samples(checkpoint: Checkpoint, before: dict[str, Any], now: dict[str, Any]) -> None:
-    """Allows a render with equal sample counts in all pixels to continue with another count."""
+    """Allows a render with the same sample count in all pixels to continue with a new ``spp``."""
     if any(before.get(name) for name in ("adaptive", "noise", "allocate")):
         return
     if now["spp"] >= checkpoint.state["pass.target"]:

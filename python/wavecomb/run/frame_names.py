@@ -120,7 +120,7 @@ def fill(pattern: str, frame: float) -> str:
 
     In the last path element, ``####`` is replaced by the frame number with four digits, ``%04d`` by
     the frame number with four characters including the sign, and ``<frame>`` by the number without
-    padding. ``$F4`` and ``${F4}`` (Houdini) have the meaning of ``####``, and ``$F`` that of
+    padding. Houdini's ``$F4`` and ``${F4}`` mean the same as ``####``, and ``$F`` means the same as
     ``<frame>``. Fractional frame numbers keep their decimals.
 
     >>> fill("out/a.####.exr", 7), fill("a%04d.png", -7), fill("a_<frame>.exr", 1.5)

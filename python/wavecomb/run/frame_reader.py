@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class CameraUpdate:
-    """Camera and metadata of a frame whose scene is otherwise that of an earlier frame.
+    """Camera and metadata of a frame whose scene otherwise equals an earlier frame's scene.
 
     Attributes:
         camera: Camera arguments for ``Renderer.edit``; None if the camera does not change.
@@ -54,7 +54,7 @@ class CameraUpdate:
 
 
 class FrameReader:
-    """An open stage and the data that its frames share.
+    """An open stage, with data that several of its frames share.
 
     While the reader is used, files of the stage must not change, except for images.
     """

@@ -84,11 +84,12 @@ _earlier: list[int] = []
 
 
 def keep_interrupts() -> None:
-    """Records Ctrl-C signals, so that the next ``Interrupt`` handles them if Python loses them.
+    """Records Ctrl-C signals, so that the next ``Interrupt`` handles those that Python loses.
 
     ``KeyboardInterrupt`` is lost if it is raised in a callback of a library that prints exceptions
     and continues. Use this function in commands that end at Ctrl-C, but not in programs with a
-    window. It also replaces the default action, which applies while the command is imported.
+    window. This function also replaces the default action, which applies while the command is
+    imported.
     """
 
     def note(number: int, frame: FrameType | None) -> None:
@@ -151,9 +152,8 @@ class Interrupt:
 def progress_console(*, quiet: bool = False) -> Console | None:
     """Returns a console on standard error for progress, or None if standard error is no terminal.
 
-    Rich decides whether standard error is a terminal. Loading Rich takes time. It is therefore
-    loaded only if standard error is a terminal or if one of Rich's environment variables declares
-    it to be one.
+    Rich decides whether standard error is a terminal. Loading Rich takes time. Rich is therefore
+    loaded only if standard error is a terminal, or if one of Rich's environment variables says so.
     """
     is_terminal = sys.stderr is not None and sys.stderr.isatty()
     if quiet or not (is_terminal or any(name in os.environ for name in _FORCED)):

@@ -47,7 +47,7 @@ class Frames:
         Args:
             path: USD file with ending .usd, .usda, .usdc or .usdz.
             options: Load options.
-            **changes: Fields of ``LoadOptions`` that replace those of ``options``.
+            **changes: Fields of ``LoadOptions`` that replace the fields of ``options``.
 
         Raises:
             WavecombError: The stage cannot be opened.
@@ -150,7 +150,7 @@ def render_frames(
 ) -> Iterator[tuple[float, Picture]]:
     """Renders frames of a stage one after another and shares unchanged data between them.
 
-    Each image is bit-identical to that of ``render(path, frame=...)``.
+    Each image is bit-identical to the image of ``render(path, frame=...)``.
 
     Args:
         path: USD file with ending .usd, .usda, .usdc or .usdz.

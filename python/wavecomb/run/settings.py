@@ -44,7 +44,7 @@ def prepare(
 ) -> tuple[Any, dict[str, dict[str, float]] | None, tuple[str, ...], Settings]:
     """Validates arguments of ``render``.
 
-    Returns custom scheduling policy and cost profile (None if not custom), AOV names and settings.
+    Returns custom policy and cost profile (each None if not custom), AOV names and settings.
     """
     own: Any = None
     if isinstance(policy, str):

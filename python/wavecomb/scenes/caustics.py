@@ -84,10 +84,10 @@ _WAVES = (
 
 LENS_FOCUS, _LENS_RADIUS = 2.0, 0.9
 """Focal length and half width of the lens, in scene units. The light is at twice the focal length,
-so the lens images it at the same distance and size on the other side."""
+so its image is at the same distance and has the same size on the other side of the lens."""
 
 _LAND = 100.0
-"""Half extent of the landscape along x and z; the glass ring that lies in it has radius 1."""
+"""Half extent of the landscape along x and z; the glass ring in the landscape has radius 1."""
 _HILL = 6.0
 
 

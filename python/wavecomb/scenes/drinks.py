@@ -41,7 +41,7 @@ def _glassy(writer: StageWriter, name: str, ior: float, **inputs: tuple[str, obj
 
 
 def _wall(height: float, inwards: float) -> tuple[float, float]:
-    """Returns a point of the tumbler's sloping wall, ``inwards`` from its outer surface."""
+    """Returns a point in the tumbler's sloping wall, ``inwards`` below the outer surface."""
     return (_RADIUS * (0.86 + 0.14 * height / _HEIGHT) - inwards, height)
 
 

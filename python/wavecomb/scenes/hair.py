@@ -53,7 +53,7 @@ def head_radius(d: FloatArray) -> FloatArray:
 def is_scalp(d: FloatArray, chance: FloatArray) -> NDArray[np.bool_]:
     """Returns whether hair grows on the head in unit directions (n, 3); the result is (n,).
 
-    Hair grows above a line from brow to neck, and sparser near the line.
+    Hair grows above a line from brow to neck, and more sparsely near the line.
     """
     line = -0.50 + 1.08 * ramp(d[:, 2], -0.5, 0.75)
     return chance < ramp(d[:, 1] - line, 0.0, 0.12)

@@ -172,7 +172,7 @@ def build_studio(writer: StageWriter, options: SceneOptions) -> None:
     """Builds 90 objects in rows on a matt floor, with key light, fill light and a dim uniform dome.
 
     The dome has most of the power of all lights, but contributes little to the image. BSDF sampling
-    also finds its light.
+    also finds the dome's light.
     """
     rng = np.random.default_rng([options.seed, 3])
     writer.material("Floor", materials.diffuse((0.35, 0.34, 0.33)))

@@ -40,8 +40,8 @@ class SceneOptions:
         splats: Number of Gaussian splats in the scene ``splats``.
         capture: PLY file of 3D Gaussian splats that replaces the contents of the scene ``splats``,
             or None.
-        capture_linear: Whether the colours in the PLY file of ``capture`` are linear. By default
-            they are sRGB, which most training programs use.
+        capture_linear: Whether the colours in the PLY file of ``capture`` are linear. By default,
+            the colours are sRGB, which most training programs use.
         voxels: Voxels along the longest edge of the grids in the scenes ``smoke`` and ``clouds``,
             at least 16.
         plain: Whether materials are written as by third-party exporters: UsdPreviewSurface in the

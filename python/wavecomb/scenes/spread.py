@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A field of stones whose materials, textures, triangles and shading cost can be set separately.
 
-The stage is for measuring how a renderer scales. Each stone is a separate mesh instead of an
+The stage serves to measure how a renderer scales. Each stone is a separate mesh instead of an
 instance, so that memory grows with the triangles. Materials are assigned to stones at random, so
 that neighbours differ. Each material has a separate texture, over which the triangles of a stone
 are scattered like the charts of an atlas. Adjacent triangles therefore read distant texels, and
@@ -60,7 +60,7 @@ def _edge(options: SceneOptions) -> int:
 
 
 def octaves(options: SceneOptions, index: int) -> int:
-    """Returns the number of octaves of noise on material ``index``.
+    """Returns the number of noise octaves that material ``index`` has.
 
     The number of octaves grows geometrically from 1 for the first material, which means no noise,
     to ``shader_cost`` for the last.

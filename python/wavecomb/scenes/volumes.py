@@ -71,7 +71,7 @@ Density = Callable[[Points], NDArray[np.float32]]
 def sampled(
     density: Density, low: Sequence[float], high: Sequence[float], voxels: int, half: bool = True
 ) -> dict[str, Any]:
-    """Samples a function of space to bricks of voxels for ``vdb.write``, except bricks of zeros.
+    """Samples a function of space as bricks of voxels for ``vdb.write``; leaves out zero bricks.
 
     Args:
         density: Function that returns values at points (n, 3), with 0 in empty space.
@@ -105,7 +105,7 @@ def sampled(
 
 
 def _where(mask: NDArray[np.bool_], points: Points, of: Density) -> NDArray[np.float32]:
-    """Evaluates a function at the points (n, 3) where a mask is true; the result is 0 elsewhere."""
+    """Evaluates a function at the points (n, 3) in a mask; the result is 0 at all other points."""
     found = np.zeros(len(points), np.float32)
     if mask.any():
         found[mask] = of(points[mask])
@@ -133,7 +133,7 @@ class _Volumes:
         net = Network(self._stage, f"/World/Looks/{name}")
 
         def coefficient(kind: str, value: Colour, field: str) -> Any:
-            """Returns a constant material input, multiplied by the grid ``field`` if named."""
+            """Returns a constant material input, multiplied by the grid ``field`` unless ""."""
             if not field:
                 return kind, value
             reader = net.node("geompropvalue", "float", geomprop=("string", field))
@@ -251,7 +251,7 @@ def build_smoke(writer: StageWriter, options: SceneOptions) -> None:
 
 
 def cloud_density(seed: int) -> Density:
-    """Returns the density (at most 1) of cumulus clouds with flat bottoms; a unit is 100 m."""
+    """Returns the density (at most 1) of flat-bottomed cumulus clouds; one scene unit is 100 m."""
     rng = np.random.default_rng([seed, 41])
     place, size = [], []
     for _ in range(9):
@@ -281,7 +281,7 @@ def cloud_density(seed: int) -> Density:
 
 
 def build_clouds(writer: StageWriter, options: SceneOptions) -> None:
-    """Builds clouds over the sea in the evening; a unit is 100 m."""
+    """Builds clouds over the sea in the evening; one scene unit is 100 m."""
     volumes = _Volumes(writer)
     _ground(writer, 400.0, (0.015, 0.03, 0.045))
     low, high = (-11.0, 0.0, -11.0), (11.0, 5.0, 11.0)

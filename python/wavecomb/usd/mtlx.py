@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Interface to MaterialX: the only module that imports ``wavecomb.usd.materialx``.
 
-Stages also load if ``wavecomb.usd.materialx`` or the ``materialx`` wheel is missing: displayColor
-replaces MaterialX materials, or they are left out, which is reported once.
+Stages also load if ``wavecomb.usd.materialx`` or the ``materialx`` wheel is missing: MaterialX
+materials are then replaced by displayColor or left out, which is reported once.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from wavecomb.usd.stage.report import LoadReport
 
 ABSENT = "MaterialX without the Python package materialx (pip install materialx)"
-"""Message if a stage uses MaterialX but it is not installed."""
+"""Message for a stage that uses MaterialX while MaterialX is not installed."""
 
 MODELS = ("standard_surface", "open_pbr_surface", "gltf_pbr")
 """Supported MaterialX shading models."""
@@ -111,7 +111,7 @@ def model_of(identifier: str) -> str:
 
 
 def hair_bsdf(shader: UsdShade.Shader) -> UsdShade.Shader | None:
-    """Returns a ``chiang_hair_bsdf`` shader, or the one that a ``surface`` node uses; else None."""
+    """Returns the shader, or a ``surface`` node's BSDF, if it is a chiang_hair_bsdf; else None."""
     identifier = shader_id(shader)
     if identifier == "ND_surface":
         source = source_of(shader, "bsdf", Usd.TimeCode.Default())
@@ -180,7 +180,7 @@ def networks(
 
 
 class _NoNodes:
-    """Implementation of ``Networks`` for use without MaterialX; it reports every node."""
+    """Implementation of ``Networks`` for use without MaterialX, which reports every node."""
 
     def __init__(self, material: Usd.Prim, textures: TextureTable, report: LoadReport) -> None:
         self.make = Expressions()

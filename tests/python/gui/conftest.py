@@ -26,7 +26,7 @@ def _modules():
 
 @pytest.fixture(autouse=True)
 def _collected(qapp, _modules):
-    """Destroys the garbage of a test after it, on the window's thread.
+    """Destroys the garbage of each test after the test, on the window's thread.
 
     Tests create Qt objects without a window. Automatic collection would destroy reference cycles
     with such objects in a later test, on any thread that allocates, and may deadlock

@@ -175,7 +175,7 @@ class Person:
         assert self.faults() == []
 
     def close(self):
-        """Ends the process in any state."""
+        """Ends the process, whatever its state."""
         if self.process.poll() is None:
             self.process.kill()
             self.process.wait(10)

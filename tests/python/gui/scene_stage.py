@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A small stage with one of everything that the scene panel shows."""
+"""A small stage with an example of everything that the scene panel shows."""
 
 STAGE = """#usda 1.0
 (

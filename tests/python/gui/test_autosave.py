@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Edits that a window did not save are offered by the next one."""
+"""Tests that a window offers edits that an earlier window did not save."""
 
 import signal
 import subprocess

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The benchmark panel runs, stops and resumes a suite, and opens its report in the browser."""
+"""Tests that the benchmark panel runs, stops and resumes a suite, and opens its report."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Image comparison without a window: loading both images, error metrics, and the FLIP process."""
+"""Tests image comparison without a window: loading, error metrics, and the FLIP process."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The comparison window: keys, mouse, dropped files, live renders."""
+"""Tests the comparison window: keys, mouse, dropped files and live renders."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def window(qtbot, new_session):
 
 @pytest.fixture
 def files(tmp_path):
-    """Two images that differ in one pixel, and one of another size."""
+    """Two images that differ in one pixel, and a third image of another size."""
     a = np.random.default_rng(1).random((20, 30, 3), np.float32)
     b = a.copy()
     b[4, 7] += np.float32(0.5)
@@ -128,7 +128,7 @@ def test_keys_switch_flip_and_move_the_line(qtbot, pair):
 
 
 def test_what_a_wipe_shows(qtbot, pair):
-    """A is painted on the left of the line and B on the right, visible in the differing pixel."""
+    """Image A is left of the line and image B is right of it, as the differing pixel shows."""
     pair.set_mode("wipe")
     view = pair.view
     at = view.target(0).topLeft()
@@ -232,7 +232,7 @@ def test_without_a_stage_keeping_says_so(qtbot, window):
 
 @pytest.mark.slow
 def test_kept_picture_against_live_settings(qtbot, session):
-    """Another policy keeps all bits, another seed changes the noise, and the viewport continues."""
+    """A new policy changes no bits, a new seed changes the noise, and the viewport continues."""
     window = CompareWindow(session)
     qtbot.addWidget(window)
     window.show()

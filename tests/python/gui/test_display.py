@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Conversion of floats to displayed colours."""
+"""Tests the conversion of floats to displayed colours."""
 
 import numpy as np
 import pytest

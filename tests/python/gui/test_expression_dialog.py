@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Light path expressions in the window: checks while typing, saved expressions, display."""
+"""Tests light path expressions in the window: checks while typing, saving, and display."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Render > Send to a farm: the job matches the window's state and is monitored."""
+"""Tests that Render > Send to a farm submits and monitors a job with the window's state."""
 
 import json
 

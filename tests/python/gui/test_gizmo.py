@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Outline, handles that move, rotate and scale the selection, and the timeline."""
+"""Tests the outline, the handles that move, rotate and scale prims, and the timeline."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ BALL, KEY = "/World/Ball", "/World/Key"
 
 @pytest.fixture
 def moved(window, qtbot, tmp_path):
-    """The window with the stage, and a function that drags a handle by real mouse events."""
+    """The window with the stage, and a function that drags a handle with real mouse events."""
     path = tmp_path / "moved.usda"
     path.write_text(STAGE)
     window.session.change(width=192, height=144, spp=2)

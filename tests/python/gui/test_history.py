@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Undo steps: merging, menu texts, saved state, and camera history."""
+"""Tests undo steps: merging, menu texts, saved state and camera history."""
 
 import weakref
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Learned data under the cursor: a map of directions, and selection probabilities of lights."""
+"""Tests the panel of learned data: a map of directions, and selection probabilities of lights."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Denoising of a live render: only complete frames, no late results, no noise in previews."""
+"""Tests that a live render denoises only complete frames, without late or noisy results."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stage loading in the window: variants, edits, changes on disk, bounds."""
+"""Tests stage loading in the window: variants, edits, changes on disk and bounds."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MaterialX materials in the panel: inputs, live edits, undo, layout."""
+"""Tests MaterialX materials in the panel: inputs, live edits, undo and layout."""
 
 import numpy as np
 import pytest
@@ -136,7 +136,7 @@ EDITS = [
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["Car", "Wood", "Standard", "Gltf"])
 def test_an_edit_is_what_is_saved(panel, same_as_saved, final, name, qtbot):
-    """After each edit, the image equals that of the saved file; undo restores the image."""
+    """After each edit, the image equals a render of the saved file; undo restores the image."""
     materials = panel.materials
     materials.choose(f"{LOOKS}/{name}")
     before = final(panel.session).beauty
@@ -260,7 +260,7 @@ def test_undo_in_a_field_undoes_the_edit(qtbot, tmp_path, looks):
 
 
 def test_digits_are_typed_where_they_were_begun(qtbot):
-    """Rounding of a value to 32 bits by the stage does not move the cursor."""
+    """The cursor does not move when the stage rounds a value to 32 bits."""
     field = NumberField("x", Range(0.0, 10.0, 0.0, 1.0))
     qtbot.addWidget(field)
     field.show()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Camera navigation, which consists of pure functions of camera poses."""
+"""Tests camera navigation, which consists of pure functions of camera poses."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Live plots and the table of runs, tested during real renders."""
+"""Tests live plots and the table of runs during real renders."""
 
 from __future__ import annotations
 

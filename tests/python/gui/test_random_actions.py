@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Three hundred random user actions: no errors, no leaks."""
+"""Tests that three hundred random user actions cause no errors or leaks."""
 
 import gc
 import random

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Log of render statistics without Qt: runs, series, rates, ratios and the table."""
+"""Tests the log of render statistics without Qt: runs, series, rates, ratios and the table."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def fill(
     log: RunLog, settings: dict[str, Any], speed: float, seconds: float = 4.0, *,
     picture: Any = "picture", noise: float = 0.0, seed: int = 1, looks: int = 12,
 ) -> None:  # fmt: skip
-    """Adds a complete run with the given speed, which is halved in the second half of the run."""
+    """Adds a run with the given mean speed, whose first half is twice as fast as the second."""
     rng = np.random.default_rng(seed)
     time = samples = 0.0
     dearness = np.where(np.arange(looks) < looks // 2, 1.0, 2.0)
@@ -206,8 +206,8 @@ def test_a_difference_holds_only_with_repeats() -> None:
 
 
 def test_no_difference_is_claimed_where_repeats_do_not_hold_it() -> None:
-    """One pair of runs differs clearly because the machine was slower. Repeated runs show no
-    difference.
+    """A single pair of runs seems to differ, because the machine was slower in one of them.
+    Repeated runs show no difference.
     """
     log = RunLog()
     for i, drift in enumerate((1.2, 0.9, 1.1, 0.85)):

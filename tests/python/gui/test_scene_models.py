@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Models of the scene panel without views: their contents, and how edits change them."""
+"""Tests the models of the scene panel without views: their contents, and effects of edits."""
 
 import ast
 from pathlib import Path
@@ -57,7 +57,7 @@ class Told:
 
 
 def test_models_know_no_widgets():
-    """Modules named as models or edits import no widgets."""
+    """The modules of models and edits import no widgets."""
     room = Path(wavecomb.gui.__file__).parent
     found = [*room.rglob("*_model.py"), *(room / "scene").glob("*edits.py")]
     found += [room / "scene" / name for name in ("history.py", "render_sync.py")]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The scene panel with real keys and clicks; images equal renders of the edited stage."""
+"""Tests the scene panel with real keys and clicks; images equal renders of the edited stage."""
 
 import numpy as np
 import pytest
@@ -122,7 +122,7 @@ def test_space_and_eye_toggle(panel, same_as_saved, qtbot, stage_path):
 
 
 def test_keys_of_the_window(qtbot, stage_path, tmp_path):
-    """Key F in the prim tree frames the selection, and Ctrl+Z undoes with the focus anywhere."""
+    """Key F in the prim tree frames the selection; Ctrl+Z undoes edits wherever the focus is."""
     from PySide6.QtCore import QSettings
 
     from wavecomb.gui.main_window import MainWindow

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Models of the scheduling panel without Qt: image comparison, policy files, choices."""
+"""Tests the models of the scheduling panel without Qt: image comparison, policies, choices."""
 
 from __future__ import annotations
 

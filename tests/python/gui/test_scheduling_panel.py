@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The scheduling panel, operated by keys and clicks during real renders."""
+"""Tests the scheduling panel by keys and clicks during real renders."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stages, settings and edits of the live render, without widgets."""
+"""Tests stages, settings and edits of the live render, without widgets."""
 
 import subprocess
 import sys

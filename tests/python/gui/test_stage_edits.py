@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Edits in the session layer equal USD's own edits, can be undone, and are exported as a layer."""
+"""Tests that edits of the session layer equal edits by USD, can be undone, and can be exported."""
 
 import pytest
 from pxr import Sdf, Usd, UsdGeom

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Worker threads hold no Qt objects, and Python's cyclic garbage contains none."""
+"""Tests that worker threads and Python's cyclic garbage hold no Qt objects."""
 
 import gc
 import os
@@ -62,7 +62,7 @@ class Saved:
 def alone(test):
     """Runs a test in a separate process, without garbage of other tests.
 
-    Tests create Qt objects without a window, and PySide may crash when they are collected.
+    Tests create Qt objects without a window, and PySide may crash when such objects are collected.
     """
     if os.environ.get("WAVECOMB_ALONE"):
         return test
@@ -83,7 +83,7 @@ def alone(test):
 @pytest.mark.slow
 @alone
 def test_garbage_that_holds_qt_is_found(qapp):
-    """``Saved`` finds a Qt object in garbage, on which the other tests rely."""
+    """``Saved`` finds a Qt object in garbage, as the other tests assume."""
 
     class Loop(QObject):
         def __init__(self):
@@ -98,7 +98,7 @@ def test_garbage_that_holds_qt_is_found(qapp):
 @pytest.mark.slow
 @alone
 def test_no_garbage_holds_anything_of_qt(qapp, stage_path, tmp_path):
-    """A window that was opened, used and closed leaves no Qt objects to any collecting thread."""
+    """A window that was opened, used and closed leaves no Qt objects for garbage collection."""
     warm = window_story.new_window(tmp_path, qapp)
     window_story.end(warm, qapp)
     del warm
@@ -136,7 +136,10 @@ def test_a_session_alone_leaves_no_garbage(qapp, stage_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("times", [1, pytest.param(10, marks=pytest.mark.long)])
 def test_another_thread_may_collect(stage_path, tmp_path, times):
-    """Another thread collects all the time while a window is used and closed. Nothing blocks."""
+    """Another thread continually collects garbage while a window is used and closed.
+
+    Nothing blocks.
+    """
     script = str(Path(window_story.__file__))
     done = subprocess.run(
         [sys.executable, script, str(stage_path), str(tmp_path), str(times)],

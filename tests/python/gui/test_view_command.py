@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`wavecomb view` from a shell: missing parts are reported in a line; Xvfb shows the stage."""
+"""Tests `wavecomb view` in a shell: one line per missing part, and the stage on Xvfb."""
 
 import os
 import signal

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Mouse and keyboard move the camera; zoom, pan, region and picking in the image."""
+"""Tests the viewport: camera movements, zoom, pan, render region and picking."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,10 @@ Left, Middle, Right = (
 
 
 def drag(widget, button, start, end, modifiers=No, steps=4):
-    """Presses, moves in steps and releases. Sends events, since QTest.mouseMove has no buttons."""
+    """Presses a mouse button, moves in steps and releases it.
+
+    QTest.mouseMove cannot hold a button.
+    """
     start, end = QPointF(*start), QPointF(*end)
     QTest.mousePress(widget, button, modifiers, start.toPoint())
     for k in range(1, steps + 1):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Toolbars, menus, messages, colours, and settings kept between windows."""
+"""Tests toolbars, menus, messages, colours, and settings that are kept between windows."""
 
 import threading
 

@@ -58,7 +58,7 @@ def new_window(folder, qapp):
 
 
 def use(window, stage, folder):
-    """Loads, navigates, edits, undoes, compares and saves; shows every dock and dialog."""
+    """Loads a stage, navigates, edits, undoes, compares and saves; shows every dock and dialog."""
     from PySide6.QtCore import Qt
     from PySide6.QtTest import QTest
 

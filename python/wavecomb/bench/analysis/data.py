@@ -27,7 +27,8 @@ SETTINGS = (
     *("wave_size", "policy", "roulette", "ray_order", "shadow_order", "max_depth"),
     *("factor", "factor_value"),
 )
-"""Settings of a run. Runs that agree in all of these columns are repetitions."""
+"""Settings of a run. Runs that agree in all of these columns are repetitions of one
+configuration."""
 
 BASELINES = {
     "policy": "none",
@@ -50,7 +51,7 @@ PLACEBO = "random-runs"
 BEST_FIRST = (BEST, COSTS)
 """Oracle policies, in order of preference, whose times define the possible gain of ordering."""
 BOUNDS = (PLACEBO, *ORACLES)
-"""Policies without practical use, whose times bound the possible gain of ordering."""
+"""Policies that are of no practical use, but whose times bound the possible gain of ordering."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +62,8 @@ class Results:
         folder: Path of the folder.
         runs: Successful runs, one row each, with the columns of ``columns``.
         failed: Failed runs, with the same columns.
-        machine: Contents of machine.json, or {} without that file.
-        suite_text: Contents of suite.toml, or "" without that file.
+        machine: Contents of machine.json, or {} if there is no such file.
+        suite_text: Contents of suite.toml, or "" if there is no such file.
     """
 
     folder: Path
@@ -133,7 +134,7 @@ def cells(
 ) -> Iterator[tuple[dict[str, Any], pd.DataFrame]]:
     """Yields groups of runs that agree in every setting except ``vary`` and ``ignore``.
 
-    A case of a suite may change settings without a column in runs.csv. Runs of such cases are
+    A case of a suite may change settings that have no column in runs.csv. Runs of such cases are
     distinguished by the name of their configuration.
     """
     varied = {vary} if isinstance(vary, str) else set(vary)
@@ -198,7 +199,7 @@ def label(cell: dict[str, Any], names: Sequence[str]) -> str:
 
 
 def varying(cells: Sequence[dict[str, Any]]) -> list[str]:
-    """Returns "stage" and all other settings in which groups of runs differ.
+    """Returns "stage" and the names of all other settings in which groups of runs differ.
 
     The column `factor_value`, the value that the suite requests, is included if no other setting
     differs. A renderer may use a smaller value, for example if a wave is larger than the image.
@@ -240,7 +241,7 @@ def labelled(
 
 
 def short_count(value: float) -> str:
-    """Formats a count, with binary units for multiples of 1024: 4096 -> 4 K, 50000 -> 50 k.
+    """Formats a count, multiples of 1024 in binary units: 4096 -> 4 K, but 50000 -> 50 k.
 
     >>> short_count(65536), short_count(1 << 20), short_count(100), short_count(1e6)
     ('64 K', '1 M', '100', '1 million')
@@ -253,10 +254,9 @@ def short_count(value: float) -> str:
 
 
 def _without(config: str, varied: set[str], across: bool) -> str:
-    """Returns the name of a configuration without the parts that name varied settings.
+    """Returns the name of a configuration without those parts that state varied settings.
 
-    With ``across``, which groups runs of all experiments, the name of the experiment is dropped
-    too.
+    With ``across``, which groups runs of all experiments, also drops the experiment's name.
     """
     parts = config.split(".")[1 if across else 0 :]
     return ".".join(part for part in parts if not any(part.startswith(f"{v}-") for v in varied))

@@ -42,11 +42,11 @@ def effects(runs: pd.DataFrame, metric: str) -> pd.DataFrame:
         effect(F = l, G = m) = effect(F = l | G = m) / effect(F = l | G = its baseline)
 
     An interaction is averaged over the combinations of all other factors in which all four pairs of
-    levels were run. If the suite is not a full factorial, other differences must not count as
-    interaction.
+    levels were run. This restriction keeps other differences from counting as interaction if the
+    suite is not a full factorial.
 
-    The metric T is the mean over rounds. Intervals come from resampling rounds. p-values test the
-    effects of single rounds, with Holm's correction over all effects of the table.
+    The metric T is the mean over rounds. Intervals come from resampling rounds. p-values come from
+    tests over the effects of single rounds, with Holm's correction over all effects of the table.
 
     Returns:
         One row per effect: ``kind`` ("main" or "interaction"), ``factor``, ``level``, ``baseline``,
@@ -107,7 +107,7 @@ def _term(of: tuple[tuple[str, Any], ...], base: dict[str, Any], cells: int) -> 
 
 
 def _rows(terms: list[dict[str, Any]], weights: list[Array], values: Array) -> list[dict[str, Any]]:
-    """Estimates all effects together. Each uses the combinations with a nonzero weight."""
+    """Estimates all effects together. An effect uses the combinations with nonzero weight."""
 
     def statistic(means: Array) -> Array:
         logs = np.log(means)
@@ -136,7 +136,7 @@ PREDICTIONS = {
     "predicted_ns": "moving average, after the last pass",
 }
 MIN_RECORDS = 256
-"""Smallest number of timed records with which a material enters the comparison."""
+"""Smallest number of timed records of a material that is included in the comparison."""
 
 
 def material_costs(results: Results) -> pd.DataFrame:

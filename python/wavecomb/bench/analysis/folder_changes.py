@@ -43,7 +43,7 @@ class Change:
         low: Lower end of the 95 % interval of the ratio; None with too few runs.
         high: Upper end of the 95 % interval of the ratio; None with too few runs.
         runs: Number of runs in BEFORE and AFTER.
-        p: p-value of no change, corrected for all configurations.
+        p: p-value of the hypothesis "no change", corrected for the number of configurations.
         verdict: Verdict on the change, such as "faster".
     """
 
@@ -175,7 +175,7 @@ def _values(results: Results, metric: str) -> dict[str, NDArray[np.float64]]:
 
 
 def _welch(a: NDArray[np.float64], b: NDArray[np.float64]) -> tuple[Estimate, float]:
-    """Returns the ratio of geometric means, b over a, and the p-value of no difference."""
+    """Returns the ratio of geometric means, b over a, and the p-value of equal means."""
     stats = needed("scipy.stats", "comparing result folders")
     log_a, log_b = np.log(a), np.log(b)
     value = math.exp(float(log_b.mean() - log_a.mean()))

@@ -67,12 +67,12 @@ def bootstrap(rounds: Array, statistic: Statistic, *, positive: bool = False) ->
 
     Args:
         rounds: (n, k): one row per round, one column per configuration; NaN marks a missing run,
-            which means leave out.
+            which is ignored.
         statistic: Maps means, (..., k), to statistics, (..., m).
         positive: Whether the statistics are ratios or times.
 
     Returns:
-        m estimates. A statistic that is undefined for some resample has no interval.
+        m estimates. A statistic that is undefined in any resample has no interval.
     """
     n = len(rounds)
 
@@ -176,7 +176,7 @@ def holm(p_values: Sequence[float]) -> list[float]:
 
 
 def verdict(estimate: Estimate, p: float, words: tuple[str, str] = ("faster", "slower")) -> str:
-    """Returns whether a ratio is below 1, above 1, within 1 % of 1, or undecided, in words.
+    """Returns whether a ratio is below 1, above 1, within 1 % of 1, or undecided, as a word.
 
     Args:
         estimate: The ratio.

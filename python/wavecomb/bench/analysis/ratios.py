@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Ratios to a baseline in groups of comparable runs: times, counts, error, efficiency."""
+"""Ratios of times, counts, errors and efficiencies to a baseline, in groups of comparable runs."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ def ratios(
     Returns:
         One row per cell and level: ``cell`` (a short name), ``level``, ``n`` (rounds),
             ``mean``, ``ratio``, ``low``, ``high``, ``p`` (Holm's over the whole table),
-            ``verdict``; and the settings of the cell. The table is empty if nothing is varied or
-            measured.
+            ``verdict``; and the settings of the cell. The table is empty if no setting varies or
+            the metric was not measured.
     """
     rows: list[dict[str, Any]] = []
     estimates = []
@@ -82,7 +82,7 @@ def ratios(
 def means(
     runs: pd.DataFrame, factor: str, metrics: Sequence[str], ignore: Sequence[str] = ()
 ) -> pd.DataFrame:
-    """Computes means over repetitions, with their number ``n``, of each level in each cell."""
+    """Computes the mean over repetitions, and their number ``n``, for each level in each cell."""
     pandas = needed("pandas", "the analysis")
     found = []
     for cell, group in cells(runs, factor, ignore):

@@ -47,8 +47,8 @@ class Row:
     Attributes:
         name: Label at the left of the row.
         value: Position of the point.
-        low: Lower end of the interval; NaN without an interval.
-        high: Upper end of the interval; NaN without an interval.
+        low: Lower end of the interval; NaN if there is no interval.
+        high: Upper end of the interval; NaN if there is no interval.
         colour: Colour of the point and its whiskers.
         hollow: Whether the point is hollow, which marks a bound or a baseline.
     """
@@ -79,7 +79,7 @@ def panels_of(
     colour: Callable[[Any], str],
     hollow: Callable[[Any], bool] = lambda row: False,
 ) -> list[Panel]:
-    """Makes a panel for each value of the column ``by``, with a row for each row of the table.
+    """Makes a panel for each value in the column ``by``, with a row for each row of the table.
 
     Args:
         table: Table with the columns ``name``, ``value``, ``low`` and ``high``.
@@ -325,7 +325,7 @@ def cost_figure(
 def difference_figure(
     pictures: Sequence[tuple[str, NDArray[Any]]], golden: NDArray[Any], name: str, title: str
 ) -> CaptionedFigure:
-    """Draws relative luminance differences to a golden image, on one scale."""
+    """Draws the relative luminance differences of images to a golden image, on one scale."""
     from wavecomb.image.compare.comparison import luminance
 
     reference = luminance(golden)

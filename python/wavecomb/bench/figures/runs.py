@@ -65,7 +65,7 @@ COHERENCE = (
 def ratio_figure(
     table: pd.DataFrame, name: str, title: str, x_label: str, factor: str
 ) -> CaptionedFigure | None:
-    """Draws a table of ``ratios``, one panel per cell; returns None if cells are too many."""
+    """Draws a table of ``ratios``, one panel per cell; returns None for too many cells."""
     if table.empty or table["cell"].nunique() > MAX_PANELS:
         return None
     panels = panels_of(

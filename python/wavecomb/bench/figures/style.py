@@ -51,7 +51,7 @@ _STYLE = Path(__file__).parent / "report.mplstyle"
 
 @dataclass(frozen=True)
 class CaptionedFigure:
-    """A figure with its title and caption.
+    """Figure with its title and caption.
 
     Attributes:
         name: Name of the files; unique in a report.
@@ -158,7 +158,7 @@ def fixed(value: float, digits: int) -> str:
 
 
 def clipped(low: float, high: float, values: Sequence[float]) -> tuple[float, float]:
-    """Returns limits of a logarithmic axis that cut off very long whiskers.
+    """Returns limits for a logarithmic axis, which cut off very long whiskers.
 
     The interval of two or three disturbed runs can span several powers of ten. Long intervals then
     extend beyond the axes, and the points remain distinguishable.
@@ -184,7 +184,7 @@ def plain_logarithm(axis: Axis, subs: Sequence[float] = (1.0, 2.0, 5.0)) -> None
 
 
 def lay_out(drawn: CaptionedFigure) -> None:
-    """Computes the layout once, so that saving in two formats does not repeat it."""
+    """Computes the layout once, so that saving two formats does not compute it again."""
     drawn.figure.draw_without_rendering()
     drawn.figure.set_layout_engine("none")
 
@@ -207,7 +207,7 @@ def svg(drawn: CaptionedFigure) -> str:
 
 
 def save(drawn: CaptionedFigure, drawing: str, folder: Path) -> None:
-    """Writes NAME.svg and NAME.png on white, never partially.
+    """Writes NAME.svg and NAME.png with a white background, each atomically.
 
     ``drawing`` is the result of ``svg``.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sections of the report about single experiments and about the suite."""
+"""Sections of the report: one for each experiment, and those about the whole suite."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def experiment(out: Writer, name: str, runs: pd.DataFrame) -> None:
 def compared(
     runs: pd.DataFrame, factor: str, columns: Mapping[str, str], ignore: Sequence[str] = ()
 ) -> dict[str, pd.DataFrame]:
-    """Returns the ``ratios`` of each column whose values are all positive, by title."""
+    """Returns tables of ``ratios`` by title, for the columns whose values are all positive."""
     measured = {words: runs[column].dropna() for words, column in columns.items()}
     tables = {
         words: ratios(runs, factor, columns[words], ignore=ignore)
@@ -83,7 +83,7 @@ def compared(
 def _ratio_figure(
     out: Writer, metrics: Mapping[str, pd.DataFrame], words: str, factor: str, name: str, title: str
 ) -> None:
-    """Draws the ratios of one metric, if the experiment has any."""
+    """Draws the ratios of one metric, if the experiment has such ratios."""
     if words in metrics:
         x_label = _LABELS.get(words, words)
         out.draw(run_figures.ratio_figure(metrics[words], name, title, x_label, factor))
@@ -146,7 +146,7 @@ def _curves(out: Writer, key: str, runs: pd.DataFrame) -> None:
 
 
 def _errors(out: Writer, runs: pd.DataFrame) -> None:
-    """Shows variance and efficiency of images that were compared with golden ones."""
+    """Shows variance and efficiency of images that were compared with golden images."""
     if runs["rel_mse"].isna().all():
         return
     factor = "renderer" if runs["renderer"].nunique() > 1 else "policy"
@@ -233,7 +233,7 @@ def _order_findings(name: str, order: pd.DataFrame) -> list[str]:
 
 
 def _bound_words(part: pd.DataFrame) -> str:
-    """Returns a sentence on the gain of the oracle policies, or "" if they were not run."""
+    """Returns a sentence about the gain of the oracle policies, or "" if they were not run."""
     known = part.dropna(subset=["placebo_ratio"]).set_index("policy")
     words = {
         BEST: "The best order of runs by recorded true costs",

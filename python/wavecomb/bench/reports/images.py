@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 MAX_STAGES = 12
 MAX_IMAGES = 8
 LARGEST = 720
-"""Largest width or height of an image in the page, in pixels. Larger images are averaged down."""
+"""Largest width or height of an image in the page, in pixels. Larger images are reduced by
+averaging pixels."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,7 @@ def shots(results: Results) -> list[Shot]:
 
 
 def _titled(row: dict[str, Any], frames: Iterable[list[tuple[dict[str, Any], Path]]]) -> str:
-    """Returns a title: the stage, with renderer and size if other images show this stage."""
+    """Returns a title: the stage, and renderer and size if there are other images of the stage."""
     others = [frame[0][0] for frame in frames if frame[0][0]["stage"] == row["stage"]]
     parts = [str(row["stage"])]
     if len({other["renderer"] for other in others}) > 1:

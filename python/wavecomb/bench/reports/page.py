@@ -91,7 +91,7 @@ def build(folder: Path, markdown: Path | None = None) -> Path:
 
 
 def _environment() -> Any:
-    """Returns a Jinja2 environment with the filters of the templates, which escapes HTML."""
+    """Returns a Jinja2 environment that escapes HTML and has the filters of the templates."""
     jinja2 = needed("jinja2", "the report")
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(_HERE),
@@ -120,7 +120,7 @@ def _write(path: Path, text: str) -> None:
 
 
 def _copy_figures(out: Writer, folder: Path) -> dict[str, str]:
-    """Copies the figures of all sections, as SVG, or PNG if that is too large; returns files."""
+    """Copies all figures as SVG, or as PNG where the SVG is too large; returns the file names."""
     folder.mkdir(parents=True, exist_ok=True)
     files = {}
     for part in (part for section in out.sections for part in section.parts):
@@ -268,7 +268,7 @@ FEW_ROUNDS = 5
 
 
 def _equal_in() -> list[str]:
-    """Returns columns of runs.csv; images of runs with equal values must be bit-identical."""
+    """Returns columns of runs.csv; if runs agree in them, their images must be bit-identical."""
     rows = options.settings().values()
     same_bits = {row.name for row in rows if not row.changes_bits} - {"spp"}
     return [
@@ -308,10 +308,10 @@ def warnings_of(results: Results) -> list[str]:
 
 
 def equality(runs: pd.DataFrame) -> tuple[int, list[str]]:
-    """Counts groups of runs that must have equal images, and names those that differ.
+    """Counts the groups of runs that must have equal images, and names groups whose images differ.
 
-    A group agrees in the sample count, the seed and all settings that change the bits of the image.
-    Runs with a time limit are left out, since their sample counts differ.
+    The runs of a group agree in the sample count, the seed and all settings that change the bits of
+    the image. Runs with a time limit are left out, since their sample counts differ.
     """
     ours = runs[(runs["renderer"] == "wavecomb") & (runs["picture_sha256"] != "")]
     ours = ours[ours["time_limit"].fillna(0) == 0]

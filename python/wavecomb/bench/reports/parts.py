@@ -22,7 +22,7 @@ class Part:
     """Base class of the elements of a report, such as paragraphs, tables and figures.
 
     Attributes:
-        kind: Name of the macro of the templates that renders the part.
+        kind: Name of the template macro that renders the part.
     """
 
     kind: ClassVar[str]
@@ -31,7 +31,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Text(Part):
-    """A paragraph, or a heading if ``mark`` is "heading". Other values are CSS classes."""
+    """A paragraph, or a heading if ``mark`` is "heading". Other marks are CSS classes."""
 
     kind = "text"
     text: str
@@ -56,7 +56,7 @@ class Code(Part):
 
 @dataclass(frozen=True)
 class Facts(Part):
-    """Table of names and values, where a value may itself be such a table. Omits empty values."""
+    """Table of names and values. A value may be another such table. Omits empty values."""
 
     kind = "facts"
     values: Mapping[str, Any]
@@ -95,7 +95,7 @@ class Table(Part):
     note: str = ""
 
     def groups(self) -> Iterator[tuple[str, list[Sequence[Cell]]]]:
-        """Yields each row heading with the other cells of all rows that have this heading."""
+        """Yields each row heading with the remaining cells of all rows that have this heading."""
         for head, rows in itertools.groupby(self.rows, key=lambda row: row[0].text):
             yield head, [row[1:] for row in rows]
 

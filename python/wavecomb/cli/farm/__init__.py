@@ -24,8 +24,8 @@ JOB = click.argument("job", type=click.Path(), metavar="JOB")
 AS_JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON on standard output.")
 MAP = click.option(
     "--map", "maps", multiple=True, metavar="FROM=TO",
-    help="Read folder TO on this machine wherever the job, its stage or its images name folder "
-    "FROM.",
+    help="On this machine, replace folder FROM by folder TO in the paths of the job, its stage and "
+    "its images.",
 )  # fmt: skip
 
 
@@ -60,8 +60,8 @@ def opened(job: str, maps: tuple[str, ...] = ()) -> Folder:
 @JOB
 @ON
 @click.option("--threads", type=click.IntRange(min=0), default=0, metavar="N",
-              help="Number of render threads of each local worker.  [default: the job's, else an "
-                   "equal share of the cores]")  # fmt: skip
+              help="Number of render threads of each local worker.  [default: the job's number, "
+                   "else an equal share of the cores]")  # fmt: skip
 @MAP
 @DASHBOARD
 @click.option("--quiet", is_flag=True, help="Print only warnings and errors.")
@@ -116,7 +116,7 @@ def status_command(job: str, maps: tuple[str, ...], as_json: bool) -> None:
 )
 @JOB
 @click.option("--image", type=click.IntRange(1), default=1, metavar="I",
-              help="Number of the image in the job, counted from 1.  [default: 1]")  # fmt: skip
+              help="Index of the image in the job; the first is 1.  [default: 1]")  # fmt: skip
 @click.option(
     "--tile",
     default="1/1",
@@ -190,7 +190,7 @@ def opened_maps(maps: tuple[str, ...]) -> None:
 )
 @JOB
 @click.option("--openjd", type=click.Path(), required=True, metavar="FILE.json",
-              help="Write a job template in the format Open Job Description.")  # fmt: skip
+              help="Write a job template in the Open Job Description format.")  # fmt: skip
 def export_command(job: str, **options: Any) -> None:
     """Write JOB for schedulers that run Open Job Description, with one task for each tile."""
     from wavecomb.farm.openjd import write_template

@@ -25,8 +25,8 @@ _SHOW_S = 0.5
 
 ON = click.option(
     "--on", default="local", metavar="local[:N]|dask:ADDRESS|slurm[:N]|none",
-    help="Render with N local workers, a Dask cluster or N Slurm workers; none only writes the "
-    "job.  [default: local, one worker]",
+    help="Render with N local workers, a Dask cluster or N Slurm workers; none writes the job "
+    "without rendering it.  [default: local, one worker]",
 )  # fmt: skip
 DASHBOARD = click.option(
     "--dashboard", type=click.IntRange(0, 65535), is_flag=False, flag_value=0, default=None,
@@ -49,7 +49,8 @@ def run_job(
     Args:
         folder: Folder of the job.
         where: The cluster.
-        threads: Threads of each local worker; 0 lets the job or the number of workers decide.
+        threads: Threads of each local worker; 0 uses the job's value, else an equal share of the
+            cores.
         dashboard: Port of Dask's dashboard; None starts no dashboard.
         as_json: Print progress and result as lines of JSON.
         quiet: Print only warnings and errors.
@@ -89,7 +90,7 @@ def run_job(
 
 
 def how_far(out: Outcome) -> str:
-    """Returns a phrase for the number of finished images and tiles of a job."""
+    """Returns a phrase with the numbers of finished images and tiles of a job."""
     words = f"{out.images_done} of {out.images} images are written"
     if out.images_done < out.images:
         words += f", {out.tasks_done} of {out.tasks} tiles are rendered"

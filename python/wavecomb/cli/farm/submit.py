@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Command ``wavecomb farm submit``, and the hidden ``farm plan`` that reads the stage for it."""
+"""Command ``wavecomb farm submit``, and the hidden command ``farm plan``, which reads its stage."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ _PLAN_S = 4 * 3600.0
     "--tiles",
     default="auto",
     metavar="auto|NxM",
-    help="Number of tile columns and rows in each image.  [default: auto, no tiles if there are "
-    "two images per worker]",
+    help="Number of tile columns and rows in each image.  [default: auto, one tile if there are "
+    "two or more images per worker]",
 )
 @click.option(
     "--job", metavar="DIR", help="Folder to write the job to.  [default: NAME.farm beside -o]"
@@ -67,8 +67,8 @@ _PLAN_S = 4 * 3600.0
 @click.option(
     "--isa",
     metavar="NAME",
-    help="CPU instruction set of all workers, such as x86-64-v3, so that all render the same "
-    "bits.  [default: each machine's]",
+    help="CPU instruction set of all workers, such as x86-64-v3, so that their images agree bit "
+    "for bit.  [default: the best of each machine]",
 )
 @DASHBOARD
 @click.option("--json", "as_json", is_flag=True, help="Print JSON on standard output.")
@@ -117,7 +117,7 @@ def submit_command(
 
 
 def ask_plan(request: dict[str, Any]) -> dict[str, Any]:
-    """Reads the stage in a child process, so that a crash in a library becomes a one-line error.
+    """Reads the stage in a child process, so that a library crash becomes a one-line error.
 
     Args:
         request: Options of ``farm submit``, or {"again": JOB} to plan an existing job again. The
@@ -189,9 +189,9 @@ def plan_command(text: str) -> None:
 
 
 def _tuples(value: Any) -> Any:
-    """Converts the lists in parsed JSON to tuples, the type of click's repeated options.
+    """Converts lists in parsed JSON to tuples, because click uses tuples for repeated options.
 
-    The entry "again", which is a job, is not converted.
+    The entry "again" holds a job and is not converted.
     """
     if isinstance(value, dict):
         return {key: v if key == "again" else _tuples(v) for key, v in value.items()}

@@ -28,7 +28,7 @@ _TILE = "tile-{}-of-{}"
 
 
 def tile_name(output: str, index: int, count: int) -> str:
-    """Returns the file name of a tile, beside its image.
+    """Returns the file name of a tile, which is stored beside its image.
 
     >>> tile_name("out/shot.0012.exr", 2, 8)
     'out/shot.0012.tile-3-of-8.exr'
@@ -50,7 +50,7 @@ def check_options(options: Mapping[str, Any], what: str = "a farm") -> None:
 
     Args:
         options: Values of the options.
-        what: Name for the message of the feature that does not support the options.
+        what: Name, for the error message, of the feature that does not support the options.
     """
     learn_from = options["learn_from"] if options["learn_from"] == BEFORE else None
     for option, given, instead in (
@@ -69,7 +69,7 @@ def check_options(options: Mapping[str, Any], what: str = "a farm") -> None:
 
 
 def _check_tile(text: str, options: RenderOptions) -> tuple[int, int]:
-    """Parses --tile to (index, count). Raises WavecombError if other options contradict it."""
+    """Parses --tile to (index, count). Raises WavecombError if other options contradict --tile."""
     from wavecomb.farm.tiling import parse_tile
 
     if text.isdecimal():
@@ -82,7 +82,7 @@ def _check_tile(text: str, options: RenderOptions) -> tuple[int, int]:
 
 
 def job_of(prepared: Prepared, **more: Any) -> Job:
-    """Builds a farm job from a command's options; tiles and files are filled in later.
+    """Builds a farm job from a command's options, without tiles and files, which are set later.
 
     Raises:
         WavecombError: --costs names a file.

@@ -38,8 +38,9 @@ class SuiteInfo:
         stages: Names of the stages of the suite.
         repetitions: Default number of repetitions.
         configurations: Number of configurations on this machine.
-        seconds: Rough time of one repetition of all configurations, at 0.4 million samples per
-            second and thread, without the time for preparing stages and golden images.
+        seconds: Rough estimate of the seconds for one repetition of all configurations, at 0.4
+            million samples per second and thread. It does not include preparing stages and golden
+            images.
         experiments: Name and number of configurations of each experiment.
     """
 

@@ -41,13 +41,13 @@ _PREPARES = {
 class BenchPanel(TakesFiles, QWidget):
     """Panel with the options, the start and stop buttons, the progress and the log of a benchmark.
 
-    The viewport pauses while a benchmark suite runs, since its renders would disturb the
-    measurement.
+    The viewport pauses while a benchmark suite runs, since renders of the viewport would disturb
+    the measurement.
 
     Signals:
         done(Path): Emitted after the report page was opened in a browser.
-        failed(str): Emitted on an error, with one line on how to fix it. The panel also shows this
-            line.
+        failed(str): Emitted on an error, with one line that says how to fix it. The panel also
+            shows this line.
     """
 
     done = Signal(object)
@@ -124,7 +124,7 @@ class BenchPanel(TakesFiles, QWidget):
 
     @property
     def busy(self) -> bool:
-        """Whether a suite is running, or a report or a time estimate is being made."""
+        """Whether a suite is running, or a report or a time estimate is in preparation."""
         return self.suite.running or self.helper.running
 
     def start(self) -> None:

@@ -37,11 +37,11 @@ class Numbers:
         comparison: Differences of the linear pixel values.
         psnr: PSNR of the displayed values, in dB.
         flip: Mean FLIP of the displayed values; None if FLIP is not computed yet or not available.
-        flip_note: Reason for a missing FLIP value.
+        flip_note: Reason why there is no FLIP value.
         test: Result of the z-test; None if no variance is known.
-        test_note: Reason for a missing z-test result.
-        others_differ: Names of the other common layers that are not bit-identical; None if only
-            ``layer`` was compared.
+        test_note: Reason why there is no result of the z-test.
+        others_differ: Names of common layers, apart from ``layer``, that are not bit-identical;
+            None if only ``layer`` was compared.
     """
 
     layer: str
@@ -59,7 +59,7 @@ class Numbers:
 
 
 def numbers(a: Side, b: Side, layer: str, exposure: float) -> Numbers:
-    """Computes all difference values except FLIP, which takes longer.
+    """Computes all difference values except FLIP, whose computation takes longer.
 
     Raises:
         ValueError: The sizes or channels differ (``picture_sides.problem`` has a clearer message).

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Computes FLIP in a separate process, because the library holds Python's lock for seconds.
+"""Computes FLIP in a separate process, because the library holds Python's GIL for seconds.
 
 When it is run as a program, this module reads a FLIP job in .npz format from stdin and writes the
 result to stdout.

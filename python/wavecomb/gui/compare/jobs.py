@@ -62,8 +62,8 @@ class Jobs(QObject):
 
     Signals:
         images(A, B): Displayed images as QImage; None for a missing image.
-        numbers(Numbers): Difference values, emitted first without and then with FLIP; None if there
-            is no comparison.
+        numbers(Numbers): Difference values. They are emitted first without FLIP, then with FLIP;
+            None if there is no comparison.
         map(QImage, Scale): Difference map and its colour scale; both are None if there is no map.
         failed(str): Emitted on an error, with a message of one line.
     """
@@ -97,7 +97,7 @@ class Jobs(QObject):
         return any(w.busy for w in (self._pictures, self._figures, self._looks, self._map))
 
     def want(self, ask: Ask) -> None:
-        """Computes all results of a request that are not displayed already."""
+        """Computes those results of a request that are not already displayed."""
         self._ask = ask
         if self._shown.get("pictures") != ask.pictures():
             self._shown["pictures"] = ask.pictures()

@@ -24,8 +24,8 @@ class Layout:
         mode: View mode, one of ``MODES``.
         shown: Image that the flip view shows, "A" or "B".
         area: Area of the widget that the panes fill.
-        size: Size of image A in pixels, or the size of image B if there is no A; None without
-            images.
+        size: Size of image A in pixels, or the size of image B if there is no A; None if there is
+            no image.
         gap: Gap between panes.
         bar: Height of the free area below the difference map, where the colour bar is drawn.
         zoom: Zoom in points per pixel; None fits the whole image into the pane.
@@ -52,7 +52,7 @@ class Layout:
         return [(k, QRectF(i * (width + gap), 0, width, height)) for i, k in enumerate(kinds)]
 
     def pane_at(self, at: QPointF) -> QRectF:
-        """Returns the pane at a point of the widget; outside all panes, returns the first pane."""
+        """Returns the pane at a point of the widget; outside all panes, the first pane."""
         panes = [rect for _, rect in self.panes()]
         return next((rect for rect in panes if rect.contains(at)), panes[0])
 

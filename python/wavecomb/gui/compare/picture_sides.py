@@ -32,7 +32,8 @@ class Side:
 
     Attributes:
         name: Displayed name, such as a file name or "viewport".
-        layers: Layers by name, float32 (height, width, channels), linear; at least one.
+        layers: Linear layers by name, float32 (height, width, channels); there is at least one
+            layer.
         note: Text about the origin of the image or the progress of its render.
         path: Path of the image file, or None.
         variance: Variance of each pixel's mean, shaped like the beauty layer; None if unknown.
@@ -57,7 +58,7 @@ class Side:
     def layer(self, name: str) -> Array | None:
         """Returns a layer of the image by name.
 
-        If the image has a single layer, as in a PNG file, that layer counts as the beauty.
+        If the image has a single layer, as a PNG file has, this layer is used as the beauty.
         """
         if name == "beauty" and name not in self.layers and len(self.layers) == 1:
             return next(iter(self.layers.values()))

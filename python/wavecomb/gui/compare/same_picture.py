@@ -67,12 +67,12 @@ def picture_key(setup: Mapping[str, Any], revision: Hashable) -> tuple[Hashable,
 
 
 class PictureBook:
-    """Fingerprints of images with equal sample counts in all pixels, and their settings."""
+    """Store of image fingerprints with the settings of the images, by key and sample counts."""
 
     def __init__(self) -> None:
         self._pictures: dict[Hashable, tuple[str, dict[str, Any]]] = {}
         self.checked = 0
-        """Number of comparisons with images from other settings since bits last differed."""
+        """Number of equal results since the last comparison in which bits differed."""
 
     def add(
         self, key: Hashable | None, samples: Hashable, mark: str, settings: Mapping[str, Any]
@@ -117,7 +117,7 @@ def _plain(value: Any) -> Hashable:
 
 
 class PictureRevision(QObject):
-    """Identifier of the scene and camera, which returns to its old value when an edit is undone."""
+    """Identifier of the scene and camera. Undoing an edit restores the earlier identifier."""
 
     def __init__(self, session: Session, parent: QObject | None = None) -> None:
         super().__init__(parent)

@@ -31,11 +31,11 @@ SHORT = {
 class SideSource(QObject):
     """Source of the image on one side of a comparison.
 
-    All methods are for the UI thread; none blocks.
+    All methods must be called on the UI thread, and none of them blocks.
 
     Signals:
         changed(): Emitted when ``side`` or ``kind`` changes.
-        failed(str): Emitted on an error, with one line on how to fix it.
+        failed(str): Emitted on an error, with one line that says how to fix it.
     """
 
     changed = Signal()

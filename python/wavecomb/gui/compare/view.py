@@ -371,7 +371,7 @@ class CompareView(TakesFiles, QWidget):
             self._pan(-dx * _PAN_STEP * pane.width(), -dy * _PAN_STEP * pane.height())
 
     def focusInEvent(self, event: object) -> None:
-        """Repaints the widget to show or hide the focus frame."""
+        """Repaints the widget, so that its focus frame appears or disappears."""
         self.update()
 
     focusOutEvent = focusInEvent

@@ -46,8 +46,8 @@ class CompareWindow(QWidget):
     """Window that compares images A and B visually and by difference values.
 
     Signals:
-        failed(str): Emitted on an error, with one line on how to fix it. The window also shows this
-            line.
+        failed(str): Emitted on an error, with one line that says how to fix it. The window also
+            shows this line.
     """
 
     failed = Signal(str)

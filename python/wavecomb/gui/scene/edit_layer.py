@@ -48,7 +48,7 @@ def save_edits(stage: Usd.Stage, path: str | os.PathLike[str]) -> Path:
     A failure leaves no partial file.
 
     Raises:
-        WavecombError: The file cannot be written, or the path is that of a file of the stage.
+        WavecombError: The file cannot be written, or is one of the stage's files.
     """
     target = Path(path)
     if target.suffix.lower() not in (".usda", ".usd"):

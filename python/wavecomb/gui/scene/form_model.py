@@ -84,9 +84,9 @@ class FieldRow:
         name: Name of the edited parameter.
         label: Label in front of the field.
         kind: "number", "colour", "switch", or "driven" for a value from a texture or primvar.
-        value: Value when the form was made: a number, a colour of three numbers, or a bool. None
-            for a driven field.
-        title: Full name for people, such as "coat weight".
+        value: Value at the time when the form was made: a number, a colour of three numbers, or a
+            bool. None for a driven field.
+        title: Full name to display, such as "coat weight".
         bounds: Range of the number, or of each component of the colour.
         default: Value of the parameter if nothing is authored; None if unknown.
         driver: Source of the value of a driven field, such as "texture wood.png".
@@ -112,13 +112,13 @@ class FormModel(QObject):
     Subclasses provide the values of the fields and receive the edits.
 
     Signals:
-        remade(): The rows changed, because the form now shows another object or no object.
+        remade(): The rows changed, because the form shows another object or no object.
         changed(): Values of the form changed, but its rows are the same.
 
     Attributes:
         rows: Fields of the form, in order.
         title: Name of the edited object, or "".
-        note: Text that is shown below the fields, or alone if there are no fields.
+        note: Text below the fields. It is shown even if there are no fields.
         set_typing: Function that is called when the user begins and ends typing a value. All
             changes in between become one undo step.
     """

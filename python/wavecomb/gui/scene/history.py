@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Undo history of edits on Qt's undo stack. Changes within one drag or one typed value merge."""
+"""Undo history of edits on Qt's undo stack. Changes of one drag or typed value are merged."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from PySide6.QtGui import QUndoCommand, QUndoStack
 from wavecomb.gui.scene.stage_edits import Step
 
 MERGE_S = 0.7
-"""Largest interval, in seconds, between changes of one value that merge into one undo step."""
+"""Largest interval, in seconds, between changes of a value that are merged into one undo step."""
 _EDIT = 1
 """Command id that Qt compares to find commands that may merge."""
 
@@ -72,7 +72,8 @@ class History(QObject):
 
     Attributes:
         stack: Qt's undo stack. The stack is in its clean state while all edits are saved.
-        now: Function that returns the time in seconds, used to detect changes of the same drag.
+        now: Function that returns the time in seconds, which tells whether changes belong to one
+            drag.
     """
 
     step = Signal(object)

@@ -90,7 +90,7 @@ def light_inputs() -> dict[str, LightInput]:
 def inputs_of(prim: Usd.Prim) -> list[LightInput]:
     """Returns the inputs of a prim in the order of a form.
 
-    Brightness comes first, then inputs of the light type without heading, then inputs with
+    Brightness comes first, then the light type's inputs without a heading, then its inputs with
     headings.
     """
     kind = KINDS.get(str(prim.GetTypeName()), "")

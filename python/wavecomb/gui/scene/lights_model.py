@@ -46,7 +46,7 @@ class LightsModel(HeadedModel):
         self.tell(0, len(HEADERS) - 1)
 
     def flags(self, index: Any) -> Qt.ItemFlag:
-        """Returns the item flags of a cell; cells that switch a light have a check box."""
+        """Returns the item flags of a cell; a cell with a light's on/off switch has a check box."""
         flags = super().flags(index)
         if index.column() in (ON, SOLO) and self._switch(self.rows[index.row()]):
             flags |= Qt.ItemFlag.ItemIsUserCheckable

@@ -2,8 +2,8 @@
 """Applies edits of a stage to the rendered scene, without loading the stage again if possible.
 
 Edits of visibility and variants add or remove objects of the scene, so the stage is loaded again.
-Edits of transforms move the objects of the scene where it can follow (``transforms``).
-Edits of constants inside a material graph or a texture reader also load the stage again.
+Edits of transforms move objects of the scene if it can follow the edit (``transforms``). Edits of
+constants inside a material graph or a texture reader also load the stage again.
 """
 
 from __future__ import annotations
@@ -41,7 +41,8 @@ class RenderSync:
         session: The session whose rendered scene is updated.
         stage_edits: Edits of the session's open stage.
         placements: Prims that were moved since the stage was loaded.
-        dragging: Whether more changes of a transform follow, so that reduced images are enough.
+        dragging: Whether further changes of a transform will follow, so that reduced images
+            suffice.
     """
 
     session: Session
@@ -63,7 +64,7 @@ class RenderSync:
     # ---- materials -----------------------------------------------------------------------------
 
     def parameters(self, path: str) -> dict[str, Parameter]:
-        """Returns the parameters of a material by name, or no parameters if it does not exist."""
+        """Returns the parameters of a material by name; none if the material does not exist."""
         prim = self.prim(path)
         return material_parameters(prim, self.time) if prim else {}
 
@@ -157,7 +158,7 @@ class RenderSync:
         return scene.bounds_of(path) is not None or any(lights)
 
     def _move(self, prims: Iterable[Sdf.Path]) -> None:
-        """Moves the rendered objects and lights at or below prims to their places on the stage."""
+        """Moves the rendered objects and lights at or below prims to their current positions."""
         stage = self.session.stage
         if stage is None:
             return
@@ -176,7 +177,7 @@ class RenderSync:
         self.session.rebuild("moved objects")
 
     def _materials_of(self, prim: Sdf.Path) -> set[str]:
-        """Returns the used materials at the path of a prim or of one of its ancestors."""
+        """Returns the scene's materials whose prim is the given prim or one of its ancestors."""
         path, stage = str(prim), self.session.stage
         known = {one for one in stage.material_paths if one} if stage is not None else set()
         return {one for one in known if path == one or path.startswith(one + "/")}

@@ -277,7 +277,7 @@ def _remove(layer: Sdf.Layer, path: Sdf.Path, what: str) -> None:
 
 
 def _text(value: Any) -> str:
-    """Formats a value for people. Numbers have four digits."""
+    """Formats a value for display. Numbers have four digits."""
     if isinstance(value, str):
         return value
     if hasattr(value, "__len__"):

@@ -24,7 +24,7 @@ OP = "xformOp:transform:edit"
 other operations."""
 _RESET = "!resetXformStack!"
 _FIXED = (UsdGeom.Camera, UsdVol.Volume, UsdLux.LightFilter, UsdLux.PortalLight)
-"""Types of prims that a move of the rendered scene does not reach."""
+"""Types of prims whose content does not move when ``Renderer.edit`` moves objects."""
 
 
 @dataclass(frozen=True)
@@ -88,8 +88,8 @@ def moves_alone(prim: Usd.Prim, time: Usd.TimeCode) -> bool:
 class Placements:
     """Prims of one stage that were moved after the stage was loaded.
 
-    The render moves objects from where they were loaded (``Renderer.edit``), so that a changed
-    transform does not load the stage again.
+    ``Renderer.edit`` moves objects relative to their loaded positions, so that the stage need not
+    be loaded again when a transform changes.
 
     Attributes:
         time: Time code at which transforms are read.
@@ -130,12 +130,12 @@ class Placements:
         self.refused.update(self._loaded)
 
     def begin(self, path: Sdf.Path) -> None:
-        """Notes where a prim was loaded, before its transform changes."""
+        """Stores the transform with which a prim was loaded, before the transform changes."""
         if path not in self._loaded:
             self._loaded[path] = self._world(path) @ np.linalg.inv(self.moved(path))
 
     def moved(self, path: Sdf.Path) -> Matrix:
-        """Returns the transform (4, 4) in world space from where a prim was loaded.
+        """Returns the transform (4, 4) of a prim, in world space, since the prim was loaded.
 
         The transform is for row vectors, and includes the moves of ancestors.
         """
@@ -145,9 +145,9 @@ class Placements:
         return np.eye(4)
 
     def moves(self, origin: Origin) -> dict[str, Matrix]:
-        """Returns the ``moves`` of ``Renderer.edit`` in the space of a scene with an origin.
+        """Returns the argument ``moves`` of ``Renderer.edit``, in the space relative to ``origin``.
 
-        A move comes in addition to the moves of ancestors.
+        The move of a prim is applied in addition to the moves of its ancestors.
         """
         there, back = np.eye(4), np.eye(4)
         there[3, :3], back[3, :3] = origin, np.negative(origin)
@@ -162,7 +162,7 @@ class Placements:
         return np.array(UsdGeom.XformCache(self.time).GetLocalToWorldTransform(prim))
 
     def _sources(self) -> list[Sdf.Path]:
-        """Returns the prototypes of all point instancers, whose instances would move as well."""
+        """Returns the prototypes of point instancers; moving a prototype moves its instances."""
         if self._prototypes is None:
             self._prototypes = [
                 target
@@ -182,7 +182,7 @@ def _ancestors(prim: Usd.Prim) -> list[Usd.Prim]:
 
 
 def _is_still(prim: Usd.Prim) -> bool:
-    """Returns whether a change below a prim is the same in world space at all times."""
+    """Returns whether a move below a prim has the same effect in world space at all times."""
     if str(prim.GetTypeName()) == "SkelRoot":
         return False
     return not prim.IsA(UsdGeom.Xformable) or not _varies(prim)

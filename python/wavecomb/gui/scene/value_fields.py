@@ -34,7 +34,7 @@ _BAR = 6
 
 
 def _is_history(event: Any) -> bool:
-    """Returns whether a key event means undo or redo."""
+    """Returns whether a key event is a shortcut for undo or redo."""
     undo, redo = QKeySequence.StandardKey.Undo, QKeySequence.StandardKey.Redo
     if event.matches(undo) or event.matches(redo):
         return True
@@ -74,7 +74,7 @@ class _Spin(QDoubleSpinBox):
             self.setValue(value)
 
     def event(self, event: QEvent) -> bool:
-        """Leaves the shortcuts of undo and redo to the window."""
+        """Passes the shortcuts for undo and redo on to the window."""
         if event.type() == QEvent.Type.ShortcutOverride and _is_history(event):
             event.ignore()
             return False
@@ -304,7 +304,7 @@ class ColourField(Field):
 
 
 class PlainText(QLineEdit):
-    """Read-only text line that can be copied, even if the line is too narrow for its text."""
+    """Read-only line of text that can be copied as a whole, even if the line is too narrow."""
 
     def __init__(self, text: str) -> None:
         super().__init__(text)

@@ -53,8 +53,8 @@ class VariantBar(QWidget):
     def _clear(self) -> None:
         """Removes all rows.
 
-        The old widgets are deleted later, because one of them may still be handling the event that
-        led to this call.
+        Qt deletes the old widgets later, because one of them may still be handling the event that
+        caused this call.
         """
         self.combos = {}
         while self._form.rowCount():

@@ -66,8 +66,8 @@ def show(
     """Returns the opinions that ``UsdGeom.Imageable.MakeVisible`` would author.
 
     The opinions show the given prim and no other hidden prim. An invisible ancestor of the prim
-    becomes visible. Siblings along the path to the prim become invisible, so that everything else
-    below the ancestor stays hidden.
+    becomes visible. Siblings along the path to the prim become invisible, so that everything below
+    the ancestor except the prim stays hidden.
     """
     chain = [prim]
     while chain[-1].GetParent() and not chain[-1].GetParent().IsPseudoRoot():

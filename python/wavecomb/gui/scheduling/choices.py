@@ -25,7 +25,7 @@ class Choice:
 
 @dataclass(frozen=True)
 class Number:
-    """A numeric setting. If the setting is 0, the field shows the text in ``zero`` instead."""
+    """A numeric setting. For the value 0, the field shows the text in ``zero``."""
 
     field: str
     label: str

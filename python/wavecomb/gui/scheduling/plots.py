@@ -267,12 +267,12 @@ def phase_colour(name: str) -> QColor:
 
 
 def phases_between(a: Look, b: Look) -> dict[str, float]:
-    """Returns the thread seconds in each render phase between two readings of the counters."""
+    """Returns the thread seconds of each render phase between two readings of the counters."""
     return {name: b.phases.get(name, 0.0) - a.phases.get(name, 0.0) for name in PHASES}
 
 
 def stacked(row: int, label: str, seconds: dict[str, float], scale: float, mode: str) -> list[Bar]:
-    """Returns the bars of one row of a phase plot. Each bar begins where the previous one ends.
+    """Returns the bars of one row of a phase plot. Each bar begins at the end of the previous bar.
 
     ``scale`` converts seconds to the shown unit.
     """

@@ -11,8 +11,8 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from wavecomb.gui.viewport.session import Frame, Session
 
 LIMIT_MS = 20_000
-"""Time limit of a step in milliseconds. A render that is not finished after this time counts with
-the samples that it has."""
+"""Time limit of a step in milliseconds. A render that takes longer is ended, and counts with the
+samples that it has."""
 
 
 class Rounds(QObject):

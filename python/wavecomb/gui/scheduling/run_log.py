@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Groups statistics of live renders into runs and series. Independent of Qt.
 
-A *look* is a reading of all counters of a render at one time. A *run* is one render with constant
-settings, from its start to the next restart. Runs with the same settings and the same image are
-repeats, which form a *series*.
+A *look* is one reading of all counters of a render. A *run* is one render with constant settings,
+from its start to the next restart. Runs with the same settings and the same image are repetitions,
+which form a *series*.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ MAX_LOOKS = 240
 is dropped to limit memory use."""
 MAX_SERIES = 100
 SHORTEST_S = 0.25
-"""Duration, in seconds, from which an abandoned run is kept. Shorter runs, such as those during a
-camera orbit, are too short to compare."""
+"""Shortest duration, in seconds, of an abandoned run that is kept. Shorter runs, such as those
+during a camera orbit, cannot be compared reliably."""
 
 
 @dataclass(frozen=True)
@@ -45,8 +45,9 @@ class Look:
     phases: Mapping[str, float] = field(default_factory=dict)
     """Thread seconds in each render phase."""
     coherence: Mapping[str, float] = field(default_factory=dict)
-    """Length of runs of one material in the shading queues, and homogeneity of the queues, as means
-    since the start of the render. The core reports no counters for these values."""
+    """Number of consecutive hits with one material in the shading queues, and homogeneity of the
+    queues, as means since the start of the render. The core reports no counters for these
+    values."""
 
 
 def take_look(stats: Mapping[str, Any]) -> Look:
@@ -123,8 +124,8 @@ class Series:
     number: int
     settings: Mapping[str, Any]
     picture: Hashable
-    """Key of everything except settings that determines the amount of work: scene, edits, camera,
-    size, seed."""
+    """Key of the scene, edits, camera, size and seed, which determine the amount of work together
+    with the settings."""
     changed: str
     """Description of the settings that differ from the previous series."""
     runs: list[Run] = field(default_factory=list)
@@ -172,8 +173,8 @@ class RunLog:
         Args:
             stats: Statistics of the render.
             settings: Values of the fields in ``FIELDS``; unknown fields may be missing.
-            picture: Key of everything except settings that determines the amount of work, such as
-                the scene.
+            picture: Key of the scene, edits, camera, size and seed, which determine the amount of
+                work together with the settings.
             finished: Whether the render has ended.
             recipe: Fields of a setup that must be restored to repeat the run.
         """
@@ -201,7 +202,7 @@ class RunLog:
     def finish(self) -> bool:
         """Marks the current run as finished.
 
-        Returns False if there is none or it was finished already.
+        Returns False if there is no current run or if it was already finished.
         """
         if self._current is None or self._current.run.finished:
             return False
@@ -210,12 +211,12 @@ class RunLog:
 
     @property
     def current(self) -> Series | None:
-        """Series of the current run, or of the last run if nothing renders."""
+        """Series of the current run, or of the last run if no render is running."""
         return self._current
 
     @property
     def base(self) -> Series | None:
-        """Series that other series are compared with: the pinned one, else the image's first."""
+        """Series with which others are compared: the pinned series, else the first of the image."""
         if self.pinned is not None:
             return self.pinned
         if self._current is None:
@@ -225,7 +226,7 @@ class RunLog:
         )
 
     def pin(self, series: Series | None) -> None:
-        """Pins the series that others are compared with.
+        """Pins the series with which other series are compared.
 
         None means the first series of the image.
         """
@@ -348,7 +349,7 @@ def ratio(above: float, below: float) -> float:
 
 
 def last_of(series: Iterable[Series], count: int, keep: Series | None = None) -> list[Series]:
-    """Returns the newest ``count`` series. If the log has ``keep``, the result includes it."""
+    """Returns the newest ``count`` series. If ``keep`` is in the log, it is included."""
     every = list(series)
     newest = every[-count:]
     if keep is not None and keep in every and keep not in newest:

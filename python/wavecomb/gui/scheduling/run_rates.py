@@ -5,9 +5,9 @@ A rate is measured over a whole run with constant settings, not at one moment. T
 is computed over the intervals between consecutive counter readings. Two runs of the same image are
 compared interval by interval, at equal numbers of samples. At equal numbers of samples, two runs
 have traced the same paths, because paths do not depend on the order of shading. Expensive parts of
-the image therefore have equal weights. A single pair of runs cannot reveal errors that affect a
-whole run, such as a change in the speed of the machine. A speed difference therefore *holds* only
-if several pairs of runs agree.
+the image therefore have the same weight in both runs. A single pair of runs cannot reveal errors
+that affect a whole run, such as a change in the speed of the machine. A speed difference therefore
+*holds* only if several pairs of runs agree.
 """
 
 from __future__ import annotations
@@ -60,8 +60,8 @@ class Ratio:
     value: float
     low: float
     high: float
-    """Upper end of the 95 % interval whose lower end is ``low``. The interval is 0 to infinity if
-    it is unknown."""
+    """Upper end of the 95 % interval; its lower end is ``low``. The interval is 0 to infinity if it
+    is unknown."""
     repeats: int
     """Number of pairs of runs. With one pair of runs, the interval ignores changes in the speed of
     the machine."""

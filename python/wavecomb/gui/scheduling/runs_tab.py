@@ -141,7 +141,7 @@ class RunsTab(QWidget):
         self.changed.emit()
 
     def repeat(self) -> None:
-        """Renders with the settings of the base and of the selected series in turn.
+        """Renders alternately with the settings of the base series and of the selected series.
 
         A second call stops the sequence of renders.
         """

@@ -129,7 +129,7 @@ def number_box(number: Number, changed: Changed) -> QSpinBox | QDoubleSpinBox:
 
 
 def control_of(row: Choice | Number, changed: Changed) -> Control:
-    """Creates the control of a setting; all bars and panels use this function."""
+    """Creates the control of a setting, for all tool bars and panels."""
     return ChoiceBox(row, changed) if isinstance(row, Choice) else number_box(row, changed)
 
 
@@ -169,7 +169,7 @@ Control = ChoiceBox | QSpinBox | QDoubleSpinBox
 
 
 def value_text(value: Any) -> str:
-    """Formats a value for people.
+    """Formats a value for display.
 
     >>> value_text(0), value_text(65536), value_text("slot")
     ('auto', '65\u202f536', 'slot')

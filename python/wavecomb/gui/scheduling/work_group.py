@@ -25,7 +25,7 @@ from wavecomb.gui.viewport.session import Session, Setup
 
 _MODE = Choice("adaptive_mode", "Adaptive", "Distribution of samples.", choices.ADAPTIVE_MODES)
 _FIRST = {"adaptive": 0.02, "noise": 0.02}
-"""Error target that each mode of adaptive sampling starts with."""
+"""Initial error target of each mode of adaptive sampling."""
 
 
 class WorkGroup(QGroupBox):

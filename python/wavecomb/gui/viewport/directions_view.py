@@ -50,7 +50,7 @@ class DirectionsView(QWidget):
         self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Draws the map as large as the widget allows, and the ring on it."""
+        """Draws the map as large as the widget allows, and then the ring."""
         if self._image is None:
             return
         wide = min(self.width(), 2 * self.height())

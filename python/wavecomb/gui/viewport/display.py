@@ -92,7 +92,7 @@ class Developed:
 def develop_frame(frame: Frame, look: Look) -> Developed:
     """Converts a layer of a frame to screen pixels.
 
-    Uses the beauty if the frame lacks the layer.
+    Converts the beauty instead if the frame lacks the layer.
     """
     layer = frame.layer(look.layer)
     if layer is None:

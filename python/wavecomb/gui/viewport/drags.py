@@ -36,7 +36,7 @@ Alt, Control, Shift = (
 def drag_of(button: Qt.MouseButton, modifiers: Qt.KeyboardModifier) -> Drag:
     """Returns the action of a mouse button.
 
-    Middle button drags work as in Blender, drags with Alt as in usdview.
+    Drags with the middle button work as in Blender; drags with Alt work as in usdview.
     """
     if button == Middle:
         if modifiers & Shift:

@@ -30,15 +30,15 @@ if TYPE_CHECKING:
     from wavecomb.usd import LoadedStage
 
 MOVING_S = 0.11
-"""Target time of a reduced image during camera movements and edits, including denoising, in
-seconds."""
+"""Target render time, in seconds, of a reduced image during camera movements and edits, including
+denoising."""
 QUICK_S = 0.15
 """If a pass at full size takes longer than this time in seconds, a reduced image is shown first."""
 
 
 @dataclass
 class Edit:
-    """Changes of a scene that are applied to the renderer together.
+    """Changes of a scene that the renderer applies together.
 
     A later value of a parameter replaces an earlier one.
     """
@@ -59,7 +59,7 @@ class Edit:
     def copied(self) -> Edit:
         """Returns a copy.
 
-        Each live render needs a copy, since later edits are merged into the object.
+        Each live render needs a separate copy, since later edits are merged into this object.
         """
         return Edit(self.camera, dict(self.materials), dict(self.lights), dict(self.moves))
 
@@ -78,7 +78,8 @@ class Task:
         moving: Whether the task renders only a reduced image.
         loaded: The loaded stage, for statistics.
         renderer: Renderer to use from now on; None keeps the current one.
-        beauty_only: Whether frames of first hits may lack all layers except the beauty.
+        beauty_only: Whether the frame that shows only first hits may lack all layers except the
+            beauty.
     """
 
     setup: Setup
@@ -106,7 +107,7 @@ class Listener(Protocol):
         """Accepts a new renderer."""
 
     def on_refused(self, message: str) -> None:
-        """Accepts the reason, in one line, why the scene cannot make the moves of an edit."""
+        """Accepts the reason, in one line, why the scene rejects the moves of an edit."""
 
 
 class Engine:
@@ -237,7 +238,10 @@ class Engine:
                 self._whole(renderer, task, filler)
 
     def _apply(self, renderer: Renderer, edit: Edit) -> None:
-        """Edits the scene. Makes an edit without its moves if the scene refuses these."""
+        """Edits the scene.
+
+        If the scene rejects the moves (transforms), applies only the other changes.
+        """
         change = partial(
             renderer.edit, camera=edit.camera, materials=edit.materials, lights=edit.lights
         )
@@ -278,7 +282,7 @@ class Engine:
         return frame
 
     def _first_hits(self, renderer: Renderer, task: Task) -> Filler:
-        """Sends a full-size image: first hits lit like the previous reduced image."""
+        """Sends a full-size frame of first hits, lit like the previous reduced image."""
         if self._shown is None or task.setup.region is not None:
             return Filler(self._shown)
         layers = (ALBEDO,) if task.beauty_only else None

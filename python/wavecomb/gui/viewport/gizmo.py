@@ -95,7 +95,7 @@ class Gizmo(QObject):
             self._view.update()
 
     def _on_changed(self) -> None:
-        """Moves the handles of a light at once; those of an object when the render has moved it."""
+        """Moves a light's handles at once, but an object's handles only with the next frame."""
         self._is_late = True
         if self._anchor is None or self._anchor.bounds is None:
             self._refresh()
@@ -183,7 +183,10 @@ class Gizmo(QObject):
         return bool(self._handle)
 
     def drag(self, place: QPointF) -> None:
-        """Continues a drag, which the render follows if it can, or else when the drag ends."""
+        """Continues a drag.
+
+        If possible, the render follows at once, otherwise at the end of the drag.
+        """
         anchor = self._anchor
         if anchor is None:
             return

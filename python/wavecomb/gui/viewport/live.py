@@ -34,7 +34,7 @@ class News:
     """An ``engine.Listener`` that stores the newest results until the UI thread takes them.
 
     Args:
-        told: Port to which None is sent when a result arrives and no other result is stored.
+        told: Port that receives None when a result arrives while no other result is stored.
     """
 
     def __init__(self, told: Port) -> None:
@@ -78,7 +78,7 @@ class News:
         self._put("ready", renderer)
 
     def on_refused(self, message: str) -> None:
-        """Keeps the reason of refused moves until it is taken."""
+        """Stores the reason why the scene refused moves (transforms) of an edit."""
         self._put("refused", message)
 
 
@@ -88,17 +88,19 @@ BURST_S = 0.15
 """Edits that follow each other within this time, in seconds, count as a drag and show reduced
 images."""
 WAIT_S = 3.0
-"""Time in seconds that an image may take during a movement before the next edit stops it."""
+"""Time in seconds that an image may take during a movement before the next edit stops its
+render."""
 DENOISE_AGAIN = 1.5
 """A frame is denoised again when its sample count has grown by this factor."""
 LATE = 4
-"""A denoised image is outdated if the newest frame has more than this many times its samples."""
+"""A denoised image is outdated once the newest frame has more than this factor times its
+samples."""
 
 IDLE, RENDERING, PAUSED, STOPPED, FINISHED = "idle", "rendering", "paused", "stopped", "finished"
 
 
 class Live(QObject):
-    """A live render that has its own settings.
+    """A live render with separate settings.
 
     All methods must be called on the UI thread, and none blocks.
 
@@ -120,7 +122,8 @@ class Live(QObject):
         edited(int): The scene or the settings changed. The argument is the new version.
         state_changed(str): "idle", "rendering", "paused", "stopped" or "finished".
         failed(str), warned(str): Error or warning message in one line.
-        refused(str): The scene could not make the moves of an edit, for the given reason.
+        refused(str): The scene could not apply the moves (transforms) of an edit; the argument is
+        the reason.
     """
 
     frame = Signal(object)
@@ -229,7 +232,7 @@ class Live(QObject):
         self._flush()
 
     def _on_still(self) -> None:
-        """Ends a movement, but shows the image of it that is being rendered first."""
+        """Ends a movement, after waiting for its reduced image if one is being rendered."""
         recent = time.perf_counter() - self._submitted < WAIT_S
         if recent and self._pending and self._awaiting and self._is_reduced:
             self._settle.start()

@@ -45,7 +45,7 @@ class Pose:
         return {**here, **camera_defaults(), **self.others}
 
     def value(self, name: str) -> Any:
-        """Returns the value of a camera parameter: that in ``others``, or else the default."""
+        """Returns the value of a camera parameter from ``others``, or else its default."""
         return self.others[name] if name in self.others else camera_parameters()[name].default
 
     def changed(self, **others: Any) -> Pose:

@@ -64,7 +64,10 @@ def edges(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 class Outline(QObject):
-    """Outline of the session's selection that is drawn over a view. Another thread computes it."""
+    """Outline of the session's selection that is drawn over a view.
+
+    Another thread computes the outline.
+    """
 
     def __init__(self, session: Session, view: PictureView) -> None:
         super().__init__(view)

@@ -39,7 +39,7 @@ def reduced_scale(pixels: int, rate: float, overhead: float, limit: float) -> in
 
 
 class Pace:
-    """Model of the time of reduced images, constant + pixels / rate, fitted to recent images."""
+    """Model of a reduced image's render time, constant + pixels / rate, fitted to recent images."""
 
     def __init__(self) -> None:
         self._sums = np.zeros(5)
@@ -60,9 +60,9 @@ class Pace:
     def _fit(self) -> tuple[float, float]:
         """Returns the fitted pixels per second (0 if unknown) and constant time in seconds.
 
-        The least squares fit includes an imaginary image of 0 pixels, with a small weight and half
-        the mean time, so that the solution is unique. The imaginary image makes the model
-        optimistic, so that larger images are tried.
+        To make the solution unique, the least squares fit includes an imaginary image of 0 pixels
+        with a small weight and half the mean time. The imaginary image makes the model optimistic,
+        so that larger images are tried.
         """
         n, x, t, xx, xt = self._sums
         if n == 0.0:
@@ -93,7 +93,7 @@ def smooth(frame: Frame, back: NDArray[np.float64]) -> NDArray[np.float32]:
 
 
 def by_first_hit(beauty: Array, albedo: Array, normal: Array, back: Array) -> NDArray[np.float32]:
-    """Returns first hits lit from the camera, with the mean brightness of the beauty."""
+    """Shades the first hits with a light at the camera, scaled to the beauty's mean brightness."""
     lit = np.clip(albedo, 0.0, 1.0) * (0.3 + 0.7 * np.abs(normal @ back))[:, :, None]
     hit = np.linalg.norm(normal, axis=2) > 0.5
     if not hit.any():

@@ -50,12 +50,12 @@ class Session(Live):
 
     Signals:
         opened(LoadedStage): A stage was loaded, or loaded again after a change of its contents.
-        closing(): The stage will be reloaded from disk. Receivers must release its prims.
+        closing(): The stage will be reloaded from disk. Receivers must release the stage's prims.
         busy(str): Description of the work in the background, or "" if there is none.
         camera_changed(Pose): The camera moved, or another camera was chosen.
         selected(str | None): The selection changed. The argument is the path of the selected prim.
         saved(str): A file was written.
-        noted(LoadedStage): The loader's report of the stage has new findings.
+        noted(LoadedStage): The load report of the stage has new messages.
 
     Attributes:
         stage: The loaded stage, or None.

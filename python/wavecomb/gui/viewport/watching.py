@@ -19,8 +19,8 @@ STATISTICS_S = 0.5
 
 
 Host = Any
-"""Type of an ``engine.Engine``. ``engine`` imports this module, so this module cannot import the
-class."""
+"""Type of an ``engine.Engine``. This module cannot import the class, since ``engine`` imports this
+module."""
 
 
 class Watch:
@@ -70,7 +70,7 @@ class Watch:
         self.held_s += time.perf_counter() - start
 
     def _send(self, snapshot: Snapshot) -> bool:
-        """Sends a frame. Returns whether the sent frame says that the render is paused."""
+        """Sends a frame. Returns whether the frame's status is paused."""
         paused = self._engine.paused
         layers = layers_of_snapshot(snapshot, self._setup.layers())
         status = {**snapshot.status, "paused": paused}

@@ -133,7 +133,7 @@ class FolderPair:
     only_b: tuple[str, ...]
 
     def compared(self) -> Iterator[PairResult]:
-        """Compares one pair after the other.
+        """Compares the pairs one after another.
 
         For an unreadable image, the result contains the problem.
         """

@@ -71,9 +71,9 @@ def heat_map(
 
     - The kind "absolute" shows luminance differences on a logarithmic scale. This scale covers four
       decades below the largest difference; smaller differences have the darkest colour.
-    - The kind "signed" uses a logarithmic scale for each sign. A is brighter than B in orange
-      pixels and darker in blue pixels. Differences that are more than four decades below the
-      largest are black.
+    - The kind "signed" uses separate logarithmic scales for positive and negative differences. A is
+      brighter than B in orange pixels and darker in blue pixels. Differences that are more than
+      four decades below the largest are black.
     - The kinds "flip-ldr" and "flip-hdr" show FLIP values from 0 to 1, computed by
     ``perceptual.flip``.
 

@@ -32,10 +32,9 @@ class ZTest:
             correction.
         tests: Number of combined tests, (tiles + 1) x channels.
         significance: Significance level.
-        worst_tile: Column and row, in pixels, of the tile with the smallest p-value. None if the
+        tile: Edge of the tiles in pixels.
+        worst_tile: Column and row, in pixels, of the tile with the smallest p-value; None if the
             p-value of the image mean is smaller.
-        worst_tile: Column and row in pixels of the tile with the smallest p-value; None if the
-            image mean has a smaller one.
         mean_z: Deviate of the image mean for each channel, in standard errors.
         pixels_accepted: Fraction of pixel values whose p-value is above the Sidak level for a test
             of all pixel values.
@@ -63,7 +62,7 @@ class ZTest:
 def sidak(p: float, tests: int) -> float:
     """Returns 1 - (1 - p)^n, the probability that the smallest of n p-values is at most p.
 
-    The p-values are independent.
+    This holds for independent p-values.
 
     >>> round(sidak(0.01, 5), 6)
     0.04901
@@ -84,10 +83,10 @@ def z_test(
 
     The deviate is z = (A - B) / sqrt(var A + var B), and the p-value is 2 (1 - Phi(|z|)). Both are
     computed for the image mean and for means over tiles, which have less noise than pixels. Sidak's
-    correction combines all p-values. A variance is that of the pixel's mean, not of one sample. The
-    test treats variances as exact, so they should come from at least about 30 independent renders.
-    The test treats pixels as independent, so that it is too strict if the pixel filter is wider
-    than a pixel.
+    correction combines all p-values. Each variance is the variance of a pixel's mean, not of one
+    sample. The test treats variances as exact, so they should come from at least about 30
+    independent renders. The test treats pixels as independent, and is therefore too strict if the
+    pixel filter is wider than a pixel.
 
     If both variances are 0, a relative difference of up to 1e-5 counts as a rounding error.
 

@@ -33,7 +33,9 @@ class ArchiveError(Exception):
 
 
 def read_archive(path: str | os.PathLike[str]) -> tuple[Any, dict[str, Any]]:
-    """Reads an uncompressed archive. Returns its header as parsed JSON, and all other arrays.
+    """Reads an uncompressed archive.
+
+    Returns the archive's header as parsed JSON, and all other arrays.
 
     Raises:
         ArchiveError: The file is not an archive, is damaged, or declares more data than it

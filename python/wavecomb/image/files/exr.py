@@ -61,7 +61,7 @@ def is_exact(layer: str) -> bool:
     """Returns whether lossy compression would make a layer useless.
 
     Lossy compression would change ids, whose bits must be exact. Dwaa treats every channel named Y
-    as luminance, whose range is too small for positions far from 0.
+    as luminance, and its range of luminance is too small for positions far from 0.
     """
     return is_crypto(layer) or aovs.content(layer) in ("exact", "id")
 
@@ -90,7 +90,8 @@ def write_exr(
         tile: Edge of square tiles in pixels, a multiple of 16; 0 means scanlines.
         metadata: File attributes of type str, int, float or (4, 4) array. "Software" has a default
             value.
-        window: Position of the pixels in a larger image; None means that they are the whole image.
+        window: Position of the pixels in a larger image; None means that the pixels are the whole
+            image.
         called: File name for error messages, if ``path`` is a temporary file.
     """
     name = os.fspath(path if called is None else called)

@@ -114,7 +114,7 @@ def display(
 
     If ``alpha`` is given, returns RGBA without premultiplication.
 
-    Pixels with a NaN become magenta, so that they are visible. Infinities are clamped.
+    Pixels with a NaN become magenta, which makes them visible. Infinities are clamped.
     """
     linear = _colours(rgb).astype(np.float32, copy=False)
     broken: NDArray[np.bool_] | None = None
@@ -147,7 +147,7 @@ def display(
 def _neutral(rgb: Array) -> Array:
     """Applies Khronos PBR Neutral: keeps colours below 0.76 and desaturates highlights.
 
-    The equations are those of the reference code of "PBR Neutral" in
+    The equations come from the reference code of "PBR Neutral" in
     https://github.com/KhronosGroup/ToneMapping.
     """
     start, desaturation, f90 = 0.8 - 0.04, 0.15, 0.04

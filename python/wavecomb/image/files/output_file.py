@@ -25,7 +25,7 @@ creating it."""
 
 
 class PrivateFolder:
-    """A hidden folder next to an output file. It is locked while its owner process runs.
+    """A hidden folder next to an output file. The folder is locked while its owner process runs.
 
     The kernel releases the lock (flock) when the owner process ends, even after a crash. The id of
     the owner process would not suffice, since containers that share a disk can have processes with
@@ -184,13 +184,14 @@ def check_name(path: str | os.PathLike[str]) -> None:
 
 
 def why_not_written(part: str | os.PathLike[str], said: str) -> str:
-    """Returns why a library could not write a file: the disk is full, or the library's message.
+    """Returns the reason why a file could not be written: a full disk, or the library's message.
 
-    Libraries do not report the error of the system, so this function tries to append to the file.
+    Libraries do not report the operating system's error, so this function finds it by appending to
+    the file.
 
     Args:
         part: The incomplete file.
-        said: Error message of the library.
+        said: The library's error message.
     """
     try:
         with open(part, "ab", 0) as file:
@@ -251,7 +252,7 @@ def one_line(message: str, name: str) -> str:
 
 
 def problem_of(library: Any) -> str:
-    """Returns the error message of OpenImageIO or of one of its readers.
+    """Returns the error message of OpenImageIO or of an OpenImageIO reader.
 
     The message may quote content of a damaged file, which may not be valid text.
     """
@@ -264,8 +265,8 @@ def problem_of(library: Any) -> str:
 def check_writable(path: str | os.PathLike[str]) -> None:
     """Raises OSError with a one-line message unless the file can be written now.
 
-    Call this function before a long computation. The function creates missing folders. It also
-    creates and removes a private folder next to the file.
+    Call this function before a long computation. The function creates missing folders. As a test,
+    it also creates and removes a private folder next to the file.
     """
     check_name(path)
     target = Path(os.path.realpath(path))

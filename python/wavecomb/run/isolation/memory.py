@@ -119,7 +119,7 @@ class Group:
 
     @classmethod
     def make(cls, bytes_: int | None) -> Group | None:
-        """Creates a control group inside that of this process.
+        """Creates a control group inside the control group of this process.
 
         Returns None if this is not permitted.
 
@@ -170,9 +170,9 @@ one byte.
 def is_exhausted(error: BaseException, layer_bytes: Callable[[], int]) -> bool:
     """Returns whether an error means that this child process has reached its memory limit.
 
-    USD reports the same error if memory is exhausted and if a value in a file is damaged. Values in
-    files of a given size have a maximum size in memory. If that size is below the memory limit, the
-    value is taken to be damaged.
+    USD reports an exhausted memory and a damaged value in a file by the same error. The total size
+    of the files bounds the size of a value in memory. If this bound is below the memory limit, the
+    error is attributed to damage.
 
     Args:
         error: The MemoryError or USD error.

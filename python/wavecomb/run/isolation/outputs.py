@@ -100,7 +100,7 @@ def _exactly(channel: socket.socket, count: int) -> bytes | None:
 
 
 class Mover:
-    """Parent process side: moves finished files from the private folder to their final names."""
+    """Object in the parent process that moves finished files from the private folder."""
 
     def __init__(self, outputs: Outputs, private: Path) -> None:
         """Stores the permitted output files and the private folder of the child process."""
@@ -159,7 +159,7 @@ class Mover:
 
 
 class Client:
-    """Child process side, which ``wavecomb.image.files.output_file`` uses.
+    """Client in the child process, for ``wavecomb.image.files.output_file``.
 
     The class is thread-safe.
     """

@@ -77,7 +77,7 @@ def crash_message(number: int, where: str, words: str, limit: str = "") -> str:
 
     Args:
         number: Number of the signal.
-        where: Last activity of the process, as returned by ``read``.
+        where: Last activity of the process, from ``read``.
         words: Output that libraries of the process wrote to stderr.
         limit: Memory limit of the process as text; empty if the process has no limit.
     """

@@ -26,7 +26,7 @@ _SYSTEM = (
     "/etc/ld.so.conf.d", "/etc/ld.so.preload", "/etc/localtime", "/etc/machine-id",
     "/etc/nsswitch.conf", "/etc/OpenCL", "/etc/passwd",
 )  # fmt: skip
-"""Files and folders that libraries read; ``--sandbox-read`` adds to them."""
+"""Files and folders that libraries read; ``--sandbox-read`` adds further paths."""
 
 _SEARCHED = (
     "PXR_AR_DEFAULT_SEARCH_PATH", "PXR_PLUGINPATH_NAME", "PXR_MTLX_PLUGIN_SEARCH_PATHS",
@@ -57,8 +57,8 @@ def command(
         inputs: Files and folders that are named on the command line. The inputs remain readable
             even if a hidden
             folder (/tmp, /run) or ``reads`` would hide them.
-        reads: Folders of ``--sandbox-read``. If there are any, only they, ``inputs`` and the
-            libraries are readable; otherwise all files of the user are.
+        reads: Folders of ``--sandbox-read``. If ``reads`` is not empty, only these folders,
+            ``inputs`` and the libraries are readable; otherwise all files of the user are readable.
         gpu: Whether the sandboxed process can use GPU devices.
     """
     line = [_PROGRAM, "--unshare-all", "--die-with-parent", "--new-session", "--cap-drop", "ALL"]
@@ -86,7 +86,7 @@ def command(
 
 
 def _existing(paths: Iterable[str]) -> list[str]:
-    """Returns the absolute paths of those paths that exist, and the targets of symbolic links."""
+    """Returns those paths that exist, as absolute paths, and the targets of symbolic links."""
     found: dict[str, None] = {}
     for path in paths:
         if path and os.path.exists(path):
@@ -117,7 +117,7 @@ def inputs_of(words: Iterable[str]) -> list[str]:
     """Returns the paths that must stay readable for a command line.
 
     For a file in /tmp/shot/usd the result is /tmp/shot, with all assets next to the stage. For a
-    file directly in /tmp the result is all regular files there.
+    file directly in /tmp, the result is all regular files directly in /tmp.
     """
     found: dict[str, None] = {}
     for word in words:

@@ -4,8 +4,8 @@
 The parent only waits; it forwards signals to the child and returns its exit code. With a sandbox
 the child is a new Python process that parses the same command line. Without a sandbox the child is
 a fork that is made before large modules are loaded. The child always has a separate process group.
-A signal from the terminal goes to a whole process group, so the child receives it only once, from
-the parent.
+A signal from the terminal goes to a whole process group, so the child receives the signal only
+once, from the parent.
 """
 
 from __future__ import annotations
@@ -252,7 +252,7 @@ class _Child:
             self._mover.serve(self._channel)
 
     def pid(self) -> int:
-        """Returns the child's process id for signals; 0 if it did not report in time."""
+        """Returns the child's process id for signals; 0 if the child did not report in time."""
         self._is_there.wait(5.0)
         return self._pid
 

@@ -2,7 +2,7 @@
 """Time limit for USD's composition of a stage.
 
 References that double at each level, or that are indirectly cyclic, can make composition take
-years, and USD offers no way to interrupt it. Therefore a thread of the child process watches
+years, and USD cannot interrupt composition. Therefore a thread of the child process watches
 composition and ends the process if it takes too long.
 """
 

@@ -12,8 +12,8 @@ from the UsdPreviewSurface inputs below, so that other renderers show a similar 
 - emissive: ``emissiveColor``, radiance.
 - principled: all inputs.
 
-``plain`` converts a material to what third-party exporters write: the metallic workflow without a
-Wavecomb program.
+``plain`` converts a material to the form that third-party exporters write: the metallic workflow
+without a Wavecomb program.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def metal(
 
 
 def dielectric(colour: Colour, roughness: float, ior: float = 1.5) -> MaterialInfo:
-    """Makes glass. The opacity is low, so that other renderers show it as glass."""
+    """Makes glass. The opacity is low, so that other renderers show the material as glass."""
     return MaterialInfo(
         "dielectric",
         {"diffuseColor": colour, "roughness": roughness, "ior": ior, "opacity": 0.1},

@@ -21,7 +21,7 @@ def grid(size: int) -> tuple[Image, Image]:
 
 
 def _cells(t: Image, cells: int) -> tuple[NDArray[np.int64], NDArray[np.int64], Image]:
-    """Returns the lattice points before and after positions, and the weight of the second."""
+    """Returns the lattice points before and after each position, and the second point's weight."""
     place = t * cells
     low = np.floor(place)
     f = (place - low).astype(np.float32)
@@ -102,7 +102,7 @@ def mix(a: Image, b: Image, weight: Image) -> Image:
 
 
 def flat(colour: tuple[float, float, float]) -> Image:
-    """Makes an image of one texel, with this colour."""
+    """Makes an image of one texel with the given colour."""
     return np.array(colour, np.float32).reshape(1, 1, 3)
 
 

@@ -21,7 +21,7 @@ from wavecomb.scenes.models.mesh import FloatArray, Mesh
 SUFFIXES = (".usda", ".usdc", ".usd")
 BOX_CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
 BOX = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-"""Corners (8, 3) of a cube about the origin, and its faces, which face outwards."""
+"""Corners (8, 3) of a cube about the origin, and its outward faces."""
 _INPUT_TYPES = {
     "diffuseColor": Sdf.ValueTypeNames.Color3f,
     "specularColor": Sdf.ValueTypeNames.Color3f,
@@ -235,7 +235,7 @@ class StageWriter:
     def define_texture(self, name: str, info: TextureInfo) -> None:
         """Registers a texture under a name that materials can use.
 
-        ``texture_size`` does not scale the texture; ``info.size`` is its edge in texels.
+        ``texture_size`` does not scale the texture; ``info.size`` is the texture's edge in texels.
         """
         self._own[name] = info
 

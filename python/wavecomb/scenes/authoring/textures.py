@@ -108,7 +108,7 @@ _TILE_SEED = 77
 
 @functools.lru_cache(maxsize=1)
 def _tile_layout(size: int) -> tuple[Image, Image, Image, Image]:
-    """Returns mask of joints, tone of each tile, fine grain and broad stains, each (size, size).
+    """Returns a mask of joints, each tile's tone, fine grain and broad stains, (size, size) each.
 
     The seed is fixed, since the colour and the roughness image of the floor tiles must have the
     same layout.
@@ -137,7 +137,7 @@ def tiles(size: int, rng: np.random.Generator) -> Image:
 
 
 def tiles_roughness(size: int, rng: np.random.Generator) -> Image:
-    """Roughness of the floor tiles: honed stone, smooth where people walk, matt joints."""
+    """Roughness of the floor tiles: honed stone with smooth walked-on areas, and matt joints."""
     del rng
     joint, tone, grain, stain = _tile_layout(size)
     rough = 0.22 + 0.12 * tone + 0.20 * grain + 0.28 * step(stain, 0.35, 0.7)

@@ -128,7 +128,7 @@ def _legs() -> list[Tube]:
 
 
 def _fins() -> list[Tube]:
-    """Makes fins along the back, lower towards both ends, and the tuft at the tail's tip."""
+    """Makes fins along the back, which are lower towards both ends, and the tuft of the tail."""
     parts = []
     t = np.linspace(0.06, 0.955, 58)
     place = spline(_BODY[:, :5], t)
@@ -180,7 +180,7 @@ def dragon_tubes() -> list[Tube]:
 
 
 def _grids(tubes: list[Tube], triangles: int) -> list[tuple[int, int]]:
-    """Chooses rings and columns for each tube, so that the total is close to ``triangles``."""
+    """Chooses the grid of each tube so that there are about ``triangles`` triangles in total."""
     extents = [tube_extent(tube) for tube in tubes]
     low, high = 0.0, 4.0 * triangles / sum(extent.weight for extent in extents)
     grids = [(4, 5)] * len(tubes)

@@ -34,9 +34,9 @@ MAX_UNPACKED = 1 << 31
 
 
 def load_dragon(path: Path) -> Mesh:
-    """Reads a mesh and scales and moves it to replace the built-in dragon.
+    """Reads a mesh, and scales and moves it so that it can replace the built-in dragon.
 
-    The mesh is scaled to the dragon's size, centred over the origin and put on y = 0. It gets
+    The mesh is scaled to the dragon's size, centred over the origin and put on y = 0. The mesh gets
     smooth normals. A mesh without texture coordinates gets a cylindrical projection about Y.
 
     Args:

@@ -114,7 +114,7 @@ def ringed(rings: float, depth: float) -> Relief:
 
 
 def fluted(folds: int, depth: float) -> Relief:
-    """Makes a relief for fins and tufts: folds along the blade."""
+    """Makes a relief of folds along the blade, for fins and tufts."""
 
     def relief(surface: Surface) -> FloatArray:
         fold = np.sin(2.0 * np.pi * folds * surface.around + 2.0 * surface.along)
@@ -124,5 +124,5 @@ def fluted(folds: int, depth: float) -> Relief:
 
 
 def skin(depth: float) -> Relief:
-    """Makes a relief for bare skin: grain only."""
+    """Makes a relief of grain only, for bare skin."""
     return lambda surface: depth * (_grain(surface, 9) + 0.6 * _grain(surface, 40))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Basic shapes of furniture, such as rounded boxes and tubes, and how to add them to a stage.
+"""Basic shapes of furniture, such as rounded boxes and tubes, and functions to add them.
 
 All shapes are closed meshes in metres. Texture coordinates are also in metres, with v along the
 grain.
@@ -137,7 +137,7 @@ def turned(profile: Sequence[Vector] | FloatArray, columns: int, steps: int = 4)
 
     Args:
         profile: Control points (radius, height) of a spline from axis to axis, upwards on the
-            outside. Repeating a control point makes the curve almost sharp there.
+            outside. A repeated control point makes an almost sharp corner.
         columns: Cells around.
         steps: Number of cells between two control points.
     """
@@ -177,7 +177,7 @@ def tube(
         width: Half width, either one number or one for each point.
         columns: Cells around.
         rings: Cells along.
-        height: Half height along ``up``; None makes it equal to the half width.
+        height: Half height along ``up``; None means the half width.
         up: Any direction that is not parallel to the tube.
     """
     control = np.asarray(points, float)

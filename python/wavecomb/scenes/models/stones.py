@@ -99,7 +99,7 @@ def build_field(
 
 
 def _cells(triangles: int) -> tuple[int, int]:
-    """Returns rows and columns of a sphere's grid that has about ``triangles`` triangles."""
+    """Returns the numbers of rows and columns of a sphere with about ``triangles`` triangles."""
     rows = max(4, round(math.sqrt(triangles / 4.0)))
     return rows, max(4, round(triangles / (2.0 * (rows - 1))))
 

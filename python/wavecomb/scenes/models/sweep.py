@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Closed tubes swept along a cubic B-spline, of which the dragon is made.
+"""Closed tubes that are swept along cubic B-splines and form the dragon.
 
 A tube has a centre line, an elliptic cross-section that varies along the line, and an "up"
 direction that keeps the cross-section from twisting. An optional relief displaces the surface along
@@ -23,7 +23,7 @@ _TEXTURE_LENGTH = 0.5
 
 @dataclass(frozen=True)
 class Surface:
-    """Grid positions at which a relief is evaluated.
+    """Positions of the grid points at which a relief is evaluated.
 
     Attributes:
         along: Arc length divided by the tube's length, 0 to 1, (rings, 1).
@@ -160,7 +160,7 @@ class Extent:
         return self.length * self.perimeter * self.detail
 
     def grid(self, density: float) -> tuple[int, int]:
-        """Returns rings and columns for ``density`` triangles per unit of ``weight``.
+        """Returns the counts of rings and columns for ``density`` triangles per unit of ``weight``.
 
         The tube has ``2 * rings * columns`` triangles.
         """

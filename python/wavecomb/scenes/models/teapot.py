@@ -119,7 +119,7 @@ def _swept(rows: FloatArray) -> FloatArray:
 def teapot_patches() -> FloatArray:
     """Returns the 32 patches in Newell's coordinates (Z up, spout along +x), float64 (32, 4, 4, 3).
 
-    The first index of a patch runs along the profile or tube, the second around it.
+    The first index of a patch runs along the profile or tube, the second around the axis or tube.
     """
     parts = [_turned(p) for p in (_RIM, _BODY, _LID, _BOTTOM)] + [_swept(_HANDLE), _swept(_SPOUT)]
     return np.concatenate(parts)

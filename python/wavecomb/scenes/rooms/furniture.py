@@ -146,7 +146,7 @@ def _ring(radius: float, height: float, thick: float, columns: int) -> Mesh:
 
 
 def floor_lamp(columns: int) -> list[Part]:
-    """Makes a floor lamp without light, with brass foot and pole, a linen shade and a bulb."""
+    """Makes a floor lamp that emits no light: brass foot and pole, a linen shade and a bulb."""
     foot = turned(
         [(0, 0), (0.15, 0), (0.15, 0), (0.152, 0.012), (0.14, 0.02), (0.03, 0.03), (0.014, 0.05),
          (0.011, 0.10), (0.011, 1.42), (0.011, 1.42), (0, 1.42)],

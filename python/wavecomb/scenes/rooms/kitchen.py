@@ -39,7 +39,7 @@ _SHELF, _HIGH = 1.45, 2.25
 """Lower and upper edge of the wall cupboards."""
 _CUPBOARD = 0.34
 _WINDOW = (1.35, 2.55, 1.12, 2.12)
-"""Extent of the window as lowest and highest x, then lowest and highest y."""
+"""Extent of the window: lowest and highest x, lowest and highest y."""
 _TILE, _GAP = 0.10, 0.003
 _OBJECTS = "/World/Objects"
 _TEAPOT_SCALE = 0.036

@@ -29,9 +29,9 @@ HEIGHT, WIDTH, DEPTH = 2.7, 5.0, 4.0
 PARTITION = 0.12
 """Thickness of the wall with the door, which is at x < 0."""
 DOOR_LOW, DOOR_HIGH, DOOR_TOP = 2.4, 3.3, 2.05
-"""Doorway as start and end along z, and height."""
+"""Extent of the doorway: start and end along z, and height."""
 NEXT_X, NEXT_LOW, NEXT_HIGH = -3.2, 0.9, 4.6
-"""Next room as x of its far wall, and start and end along z."""
+"""Extent of the next room: x of its far wall, start and end along z."""
 DOOR_DEGREES = 25.0
 _THICK = 0.15
 _INTO = 0.05
@@ -64,7 +64,7 @@ def _walls(writer: StageWriter) -> None:
 def _solid(
     writer: StageWriter, path: str, low: FloatArray, high: FloatArray, material: str
 ) -> None:
-    """Adds a box of flat polygons with texture coordinates in metres; v runs along x on its top."""
+    """Adds a box of flat polygons, with texture coordinates in metres; on top, v runs along x."""
     points: list[FloatArray] = []
     uv: list[FloatArray] = []
     polygons: list[list[int]] = []

@@ -183,7 +183,7 @@ HANGER = 0.045
 
 
 def jar(columns: int, content: str) -> list[Part]:
-    """Makes a glass jar, two thirds full, with a steel lid."""
+    """Makes a glass jar with a steel lid, filled to two thirds."""
     profile = [
         (0, 0), (0.044, 0), (0.044, 0), (0.047, 0.003), (0.047, 0.12), (0.042, 0.138),
         (0.042, 0.145), (0.039, 0.145), (0.039, 0.137), (0.0445, 0.12), (0.0445, 0.006),

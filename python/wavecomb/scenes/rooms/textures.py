@@ -50,7 +50,7 @@ def plaster_normal(size: int, rng: np.random.Generator) -> Image:
 
 @functools.lru_cache(maxsize=1)
 def _planks(size: int) -> tuple[Image, Image, Image]:
-    """Returns joints, tones of boards and grain, each (size, size), for all images of the floor."""
+    """Returns the joints, board tones and grain of the floor's images, each (size, size)."""
     rng = np.random.default_rng(_LAYOUT_SEED)
     x, y = grid(size)
     across = x * _BOARDS
@@ -123,7 +123,10 @@ def _threads(size: int, rng: np.random.Generator) -> tuple[Image, Image]:
 
 
 def linen(size: int, rng: np.random.Generator) -> Image:
-    """Undyed linen, near white. Materials tint it with the ``scale`` input of the texture."""
+    """Undyed linen, near white.
+
+    Materials tint the linen with the ``scale`` input of the texture.
+    """
     height, strength = _threads(size, rng)
     shade = (0.55 + 0.45 * height) * (0.93 + 0.07 * strength)
     return np.clip(flat((0.80, 0.79, 0.76)) * shade[..., None], 0, 1).astype(np.float32)

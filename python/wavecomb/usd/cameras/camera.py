@@ -68,7 +68,7 @@ class Lens:
         conform: Rule that fits the camera's aperture to the image if their aspect ratios differ.
         pixel_aspect: Width of a pixel divided by its height.
         settings: Values of ``lens.ATTRIBUTES`` as text; they override the prim's attributes.
-        st_map: Path of an ST map that describes the lens distortion; it overrides distortion
+        st_map: Path of an ST map that describes the lens distortion; the map overrides distortion
             coefficients.
     """
 
@@ -102,7 +102,7 @@ class Lens:
 
 
 def find_camera(stage: Usd.Stage, wanted: str | None, has_cameras: bool = True) -> Usd.Prim | None:
-    """Returns the camera ``wanted``, that of the render settings, or the stage's first camera.
+    """Returns the camera ``wanted``, else the render settings' camera, else the first of the stage.
 
     ``has_cameras`` may be False if the stage is known to have no cameras, which saves a search.
 
@@ -327,7 +327,7 @@ def frame_points(
     lens: Lens = Lens(),
     size: tuple[int, int] = (1, 1),
 ) -> View:
-    """Returns a three-quarter view that frames points (n, 3); None frames a cube at the origin.
+    """Returns a three-quarter view that frames points (n, 3) or, for None, a cube at the origin.
 
     Args:
         points: Outline points of the visible geometry, from ``framing.outline``.

@@ -30,7 +30,7 @@ _FEW_POINTS = 200
 """Number of points up to which an outline keeps all points."""
 
 MANY_POINTS = 1 << 16
-"""Size of a point set above which it is reduced to its outline before more points are added."""
+"""Number of points above which a point set is reduced to its outline before points are added."""
 
 _FEW_PLACES = 512
 """Number of instances above which only the outermost instances contribute to an outline."""
@@ -55,7 +55,7 @@ def with_directions(more: Points | None) -> Points:
 
 
 def outline(points: NDArray[Any], more: Points | None = None) -> Points:
-    """Returns those of the points (n, 3) that are extreme in at least one direction."""
+    """Returns the points among ``points`` (n, 3) that are extreme in at least one direction."""
     if len(points) <= _FEW_POINTS:
         return np.asarray(points, np.float64)
     directions = with_directions(more).astype(np.float32)
@@ -183,9 +183,9 @@ def fit(
 ) -> Points:
     """Computes the position from which a pinhole camera frames the points.
 
-    A point (x, y, z) in camera axes is inside the image where |x - cx| <= half (cz - z), and the
-    same for y. The four edges of the image are planes through the camera. The points touch the pair
-    of opposite planes that is tighter, and are centred between the planes of each pair.
+    A point (x, y, z) in camera axes is inside the image if |x - cx| <= half (cz - z), and the same
+    holds for y. The four edges of the image are planes through the camera. The points touch the
+    pair of opposite planes that is tighter, and are centred between the planes of each pair.
 
     Args:
         points: (n, 3).

@@ -193,7 +193,7 @@ def crease_pairs(
 Matrices = NDArray[np.float64]
 
 NEAREST = 16
-"""Number of instances of a mesh whose edges are measured in pixels, the largest in the image."""
+"""Number of instances of a mesh, the largest in the image, whose edges are measured in pixels."""
 
 
 class ViewSize:
@@ -223,8 +223,8 @@ class ViewSize:
         """Returns divisors (n,) that convert lengths at points (n, 3) to projected lengths.
 
         For a perspective camera, the divisor is the depth of a point in front of the camera, or the
-        distance of a point behind the camera. For a latlong camera it is the distance, and for an
-        orthographic camera 1.
+        distance of a point behind the camera. For a latlong camera, the divisor is the distance;
+        for an orthographic camera, it is 1.
         """
         if self.projection == "orthographic":
             return np.ones(len(points))
@@ -236,7 +236,7 @@ class ViewSize:
         return np.asarray(away, np.float64)
 
     def edges(self, cage: Cage, bounds: NDArray[Any], placed: Matrices) -> float:
-        """Returns the mean edge length of a cage in pixels, for the instance where it is largest.
+        """Returns the mean edge length of a cage in pixels, for the instance with the largest mean.
 
         Args:
             cage: The cage.

@@ -61,7 +61,7 @@ class CurveArrays:
         segments: (m,) segments as 32-bit words for ``SceneBuilder.add_curves``; None for points.
         radii: (n,) radii at control points, or radii of points.
         normals: (n, 3) or (s, n, 3) normals of ribbons; None for tubes and points.
-        uvs: (m, 2, 2) texture coordinates at both ends of segments, or (n, 2) of points; None if
+        uvs: (m, 2, 2) texture coordinates at both ends of segments, or (n, 2) at points; None if
             not needed.
         bounds: (2, 3) lowest and highest coordinates.
         topology: Layout of the curves, which maps primvars to segments.
@@ -155,7 +155,7 @@ class CurveReader:
         )
 
     def _without(self, bad: NDArray[np.bool_], strands: Strands, prim: Usd.Prim) -> Strands:
-        """Returns the layout of those curves whose points are all valid."""
+        """Returns the layout of the curves that have no invalid points."""
         kept = strands.over_each(np.maximum, bad) == 0
         if not kept.any():
             raise MeshError("their points are not finite or too far away")
@@ -238,7 +238,7 @@ def over_shutter(
 ) -> CurveArrays:
     """Returns curves or points with their positions and normals at the shutter steps.
 
-    Widths and texture coordinates are those at the time of the frame.
+    Widths and texture coordinates are read at the time of the frame.
 
     Args:
         prim: Prim whose points are animated.

@@ -128,7 +128,7 @@ class GprimReader:
             draw: The gprim.
             names: Names of primvars for texture coordinates; the first primvar that exists is used.
             in_world: Whether the group of the gprim is the world.
-            detail: Simplification of curves; it depends on the view, so its result is not cached.
+            detail: Simplification of curves; the result depends on the view and is not cached.
 
         Raises:
             MemoryError: The process is out of memory, so that reading further prims would fail as
@@ -207,8 +207,8 @@ def add_shape(
 ) -> int:
     """Adds the arrays of a gprim to the scene and returns the id of the new object.
 
-    ``options`` are keyword arguments for ``add_splats`` if the gprim is splats. Otherwise they are
-    keyword arguments that ``add_mesh``, ``add_curves`` and ``add_points`` share.
+    ``options`` are keyword arguments for ``add_splats`` if the gprim is splats. Otherwise,
+    ``options`` are keyword arguments that ``add_mesh``, ``add_curves`` and ``add_points`` share.
     """
     # Pass only the arrays that exist. This saves time on stages with a hundred thousand gprims.
     if isinstance(shape, MeshArrays):

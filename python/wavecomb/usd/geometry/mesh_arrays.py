@@ -115,7 +115,7 @@ def transform_shape(
 ) -> tuple[Array, Array, Array]:
     """Transforms points and normals (n, 3) of a shape and returns them with their bounds (2, 3).
 
-    The result is the same as from ``bake``, ``bake_normals`` and ``extent``, but takes one call.
+    One call gives the same results as ``bake``, ``bake_normals`` and ``extent``.
 
     Raises:
         MeshError: A point is not finite or too far away.
@@ -178,7 +178,7 @@ def read_faces(prim: Usd.Prim, time: Usd.TimeCode) -> tuple[Ints, Ints]:
 
 
 def _surface(prim: Usd.Prim, time: Usd.TimeCode) -> Ints:
-    """Returns the authored surface triangles, or else the faces that only one tetrahedron has."""
+    """Returns the authored surface triangles, or else the faces of only one tetrahedron each."""
     values = as_array(prim.GetAttribute("surfaceFaceVertexIndices").Get(time))
     if values is None or len(values) == 0:
         tetrahedra = as_array(prim.GetAttribute("tetVertexIndices").Get(time))

@@ -102,7 +102,8 @@ class PatchReader:
             uv_names: Names of primvars for texture coordinates; if none exists, u and v run from 0
                 to 1.
             inherited: Constant primvars of the patch's ancestors.
-            motion: Shutter over which points are read; None reads them at the time of the frame.
+            motion: Shutter over which points are read; None reads the points at the time of the
+                frame.
 
         Raises:
             MeshError: The patch is invalid.
@@ -285,7 +286,7 @@ def _together(points: Floats, normals: Array, near: float) -> Floats:
 
 
 def _joined(axes: tuple[_Axis, _Axis], place: Floats) -> Floats:
-    """Makes points bit-identical on both sides of hard edges and where closed patches meet."""
+    """Makes points bit-identical on both sides of hard edges and of the seams of closed patches."""
     u, v = axes
     grid = place.reshape(len(v.at), len(u.at), 3)
     for axis, view in ((v, grid), (u, np.swapaxes(grid, 0, 1))):

@@ -72,7 +72,7 @@ def as_integers(value: Any, dtype: Any = np.int32) -> NDArray[Any]:
 
 
 def authored_names(prim: Usd.Prim) -> frozenset[str]:
-    """Returns the names of authored properties; a call takes as long as querying one attribute."""
+    """Returns the names of authored properties, which takes as long as querying one attribute."""
     return frozenset(prim.GetAuthoredPropertyNames())
 
 

@@ -33,7 +33,7 @@ RINGS = 32
 class Shape:
     """Triangles of an implicit shape.
 
-    Contract: prims of equal sizes share the arrays, so that callers must not modify them.
+    Contract: prims of equal sizes share the arrays, so callers must not modify the arrays.
     """
 
     positions: Array

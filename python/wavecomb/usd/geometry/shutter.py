@@ -23,7 +23,7 @@ MAX_STEPS = 64
 """Maximum number of motion steps that the user may request."""
 
 _CHOICES = (2, 3, 4, 5, 8)
-"""Numbers of motion steps that are tried in ascending order if the user requests none."""
+"""Numbers of motion steps that are tried in ascending order unless the user requests a number."""
 
 _BEND = 5e-3
 """Largest deviation from linear motion between steps, as a fraction of the whole motion."""
@@ -171,7 +171,7 @@ class Motion:
 
 
 def _is_straight(values: Matrices, between: Matrices) -> bool:
-    """Returns whether linear interpolation between steps is close to the values ``between``."""
+    """Returns whether linear interpolation of steps is close to the samples ``between`` them."""
     off = np.abs(between - 0.5 * (values[1:] + values[:-1]))
     span = np.abs(values - values[:1])
     size = np.abs(values[..., :3, :3]).max()

@@ -91,9 +91,9 @@ class Skin:
     ) -> Array:
         """Returns deformed normals (n, 3).
 
-        The normals are those of ``count`` points; if ``corners`` is given, they are those of
-        corners whose points have these indices. Normals use linear blending even if the skinning
-        method is dual quaternion; the difference is small after normalisation.
+        The normals belong to ``count`` points or, if ``corners`` is given, to corners whose points
+        have the indices ``corners``. Normals use linear blending even if the skinning method is
+        dual quaternion; the difference is small after normalisation.
 
         Raises:
             SkinError: The joint influences do not match the mesh.

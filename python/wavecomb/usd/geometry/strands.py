@@ -42,7 +42,7 @@ _AT_ONCE = 1 << 16
 
 
 def runs(counts: Index) -> tuple[Index, Index]:
-    """Returns the run of each element, and its index in the run, for runs of given lengths."""
+    """Returns, for runs of given lengths, each element's run and its index in the run."""
     owner = np.repeat(np.arange(len(counts)), counts)
     starts = np.cumsum(counts) - counts
     return owner, np.arange(len(owner)) - starts[owner]
@@ -331,8 +331,8 @@ class StrandDetail:
 
     Strands narrower than ``pixels`` are kept with probability width / ``pixels`` and widened by the
     inverse of this probability, which preserves coverage (Cook, Halstead, Planck and Ryu 2007). The
-    choice depends on the strand's index in the prim, so that a larger distance only removes further
-    strands.
+    choice depends on the strand's index in the prim, so that a larger distance removes further
+    strands but restores none.
     """
 
     def __init__(self, view: ViewSize, pixels: float, report: LoadReport) -> None:
@@ -349,7 +349,7 @@ class StrandDetail:
         widths: NDArray[Any],
         matrix: Gf.Matrix4d,
     ) -> tuple[Strands, NDArray[np.float64]]:
-        """Returns the strands that are kept, and the factor by which each of them is widened.
+        """Returns the strands that are kept, and the widening factor of each.
 
         Args:
             path: Path of the prim.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Subdivides and displaces meshes after the camera, and so their size in the image, is known."""
+"""Subdivides and displaces meshes once the camera, and thus their size in the image, is known."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from wavecomb.usd.stage.frame_cache import RefinedCache
 
 TARGET_PIXELS = 2.0
-"""Largest edge length of refined faces in pixels that automatic levels aim at."""
+"""Maximum edge length of refined faces, in pixels, at which automatic levels aim."""
 
 AUTO_LEVEL = 8
 """Highest level that is chosen automatically; users may request up to ``MAX_LEVEL``."""
@@ -155,8 +155,8 @@ class SubdivisionSurfaces:
     def limit_points(self, cage: Cage) -> NDArray[np.float32] | None:
         """Returns points near the limit surface of a cage.
 
-        Returns None if the cage will not be subdivided, or if it is so fine that its own points are
-        close to the limit surface.
+        Returns None if the cage will not be subdivided, or is so fine that its points are close to
+        the limit surface anyway.
         """
         if cage.scheme == "none" or not self.subdivide or self.choice == 0:
             return None
@@ -218,7 +218,7 @@ class SubdivisionSurfaces:
             self.report.note(f"subdivision meshes refined: {text}")
 
     def _next_batch(self, waiting: deque[SubdivisionSurface]) -> list[SubdivisionSurface]:
-        """Removes the next meshes from the queue that are refined together."""
+        """Removes from the queue the next meshes, which are refined together."""
         batch: list[SubdivisionSurface] = []
         triangles = 0
         while waiting and triangles < _BATCH_TRIANGLES:

@@ -225,7 +225,7 @@ def clip_ears(
     """Splits one simple polygon (k, 3) into triangles (k - 2, 3) by clipping ears.
 
     A polygon that crosses itself is split into overlapping triangles. After ``_EAR_STEPS`` steps,
-    further corners are cut off without a check; the second result is their number.
+    corners are cut off without a check; the second result is the number of these corners.
     """
     drop = int(np.argmax(np.abs(normal)))
     axes = [(drop + 1) % 3, (drop + 2) % 3]

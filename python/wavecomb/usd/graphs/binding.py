@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 _LOCAL, _AXES = OF_SPACE[:2], OF_SPACE[2:]
 
 _CONSTANTS = {*TEXTURED_PARAMETERS, "ior"} - {"normal"}
-"""Parameters of surfaces, besides those of OpenPBR layers, that may become constants."""
+"""Parameters of surfaces, besides the parameters of OpenPBR layers, that may become constants."""
 
 
 def bound(
@@ -94,7 +94,7 @@ def with_uv_sets(surface: Surface, sets: Mapping[str, str], own: str) -> Surface
     """Returns a surface that reads UV primvars instead of the mesh's default texture coordinates.
 
     Args:
-        surface: The surface; if its graph reads primvars, a result of ``bound``.
+        surface: The surface, which must be a result of ``bound`` if its graph reads primvars.
         sets: UV primvar of each textured parameter, by parameter.
         own: UV primvar of the surface's graph; an empty string means the mesh's default texture
             coordinates.

@@ -103,7 +103,7 @@ def in_working_space(make: Expressions, value: Value, working: str) -> Value:
 
 
 def uv_matrix(uv: Value) -> tuple[float, ...] | None:
-    """Returns m with u' = m[0] u + m[1] v + m[2], v' = m[3] u + ...; None if it is not affine."""
+    """Returns m with u' = m[0] u + m[1] v + m[2], v' = m[3] u + ...; None if not affine."""
     rows: list[float] = []
     for part in uv:
         found: Linear | None = linear(part, _is_uv)
@@ -255,7 +255,7 @@ class Drivers:
 
 
 def graphs_of(outputs: Mapping[str, Value], primvars: tuple[str, ...]) -> SurfaceGraph | None:
-    """Compiles the graphs of parameters with primvars at their defaults; None without parameters.
+    """Compiles the graphs of parameters with default primvars; None if there are no parameters.
 
     Raises:
         GraphTooLarge: The graph exceeds the size limit.

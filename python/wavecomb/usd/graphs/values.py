@@ -337,7 +337,8 @@ class Expressions:
     def op(self, code: str, *given: Operand, number: int = 0, width: int = 0) -> Value:
         """Applies an operation to values per component, or for some codes to whole vectors.
 
-        ``width`` is the number of result components if the operands do not determine it.
+        ``width`` is the number of components of the result if the operands do not determine the
+        number.
         """
         operands = tuple(numbers(one) if isinstance(one, float) else one for one in given)
         if code in _POINTS:

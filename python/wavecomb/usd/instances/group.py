@@ -227,7 +227,7 @@ def _placed(
 
 
 MIN_IRRADIANCE = 0.02
-"""Irradiance from which an object counts as lit: a hundredth of the default dome's irradiance."""
+"""Smallest irradiance of a lit object: a hundredth of the default dome's irradiance."""
 
 MAX_SAMPLED_EMITTERS = 2048
 """Maximum number of objects, and of emitters, for which irradiance is estimated."""
@@ -309,7 +309,7 @@ def placements(world: Group) -> dict[int, Matrices]:
 
 
 def _append_in_order(group: Group, met: set[int], order: list[Group]) -> None:
-    """Appends groups so that each group precedes the groups that instance it."""
+    """Appends groups so that each one precedes the groups that contain its instances."""
     met.add(id(group))
     for child, _ in group.surfaced:
         if id(child) not in met:

@@ -63,7 +63,7 @@ class GroupBuilder:
 
         ``cache`` stores mesh arrays between frames. ``progress`` is the progress callback.
         ``detail`` simplifies curves that are in the world group. If ``notes_emitters`` is set,
-        groups collect their emissive meshes. ``has_other_emission`` then tells whether curves,
+        groups collect their emissive meshes. ``has_other_emission`` then states whether curves,
         points or materials of instances emit light, which groups do not collect.
         """
         self.notes_emitters = notes_emitters
@@ -102,7 +102,7 @@ class GroupBuilder:
         predicate: Any = None,
         base: Gf.Matrix4d = IDENTITY,
     ) -> None:
-        """Reads prims and their descendants into a group after the transform ``base``."""
+        """Reads prims and their descendants into a group, with the parent transform ``base``."""
         found = self.traversal.walk(roots, purpose, predicate, scope.inherited, base)
         group.lights += found.lights
         self.memory_check.check(found.draws)

@@ -191,7 +191,7 @@ class InstanceBindings:
         count: int,
         predicate: Any,
     ) -> Iterator[tuple[NDArray[np.bool_] | slice, InstanceBinding]]:
-        """Yields sets of instances of a prototype that pass equal materials and primvars to it.
+        """Yields sets of a prototype's instances that pass equal materials and primvars.
 
         Args:
             instance: The point instancer.

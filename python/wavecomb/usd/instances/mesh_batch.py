@@ -42,11 +42,11 @@ _MOST = 1024
 """Maximum number of meshes in a batch."""
 
 _FEW = 4
-"""Fewer meshes than this are added separately."""
+"""Smallest number of meshes that are added together; fewer meshes are added separately."""
 
 _APART = 16
-"""Number of meshes that are added separately from one that is not simple on, since such meshes
-often follow each other."""
+"""Number of meshes that are added separately, starting with one that is not simple, since such
+meshes often follow each other."""
 
 
 LoadProgress = Callable[[int, int], None]
@@ -57,7 +57,7 @@ _STEP = 512
 
 
 class DrawCount:
-    """Number of gprims that were found and drawn.
+    """Counter of the gprims that were found and drawn.
 
     Attributes:
         found: Number of gprims found so far.
@@ -146,7 +146,7 @@ class MeshBatches:
             start += apart
 
     def _fits(self, draw: DrawItem) -> bool:
-        """Returns whether a gprim is a mesh that is likely to be simple; reads no values."""
+        """Returns whether a gprim is probably a simple mesh, without reading attribute values."""
         if draw.kind != "mesh" or draw.track is not None or draw.subsets:
             return False
         if not (draw.names >= _NEEDED and draw.names.isdisjoint(_COMPLEX)):
@@ -187,7 +187,7 @@ class MeshBatches:
         return not self._gprims.deforms("mesh", prim) and self._gprims.skeletons.of(prim) is None
 
     def _add(self, rows: Sequence[_Row]) -> int:
-        """Adds meshes up to the first one that is not plain; returns their number."""
+        """Adds the meshes before the first one that is not plain; returns how many were added."""
         sizes = np.array(
             [(len(row.points), len(row.counts), len(row.indices)) for row in rows], np.uint32
         )

@@ -255,7 +255,7 @@ def outline_of(
 def outline_of_points(
     points: NDArray[Any], triangles: NDArray[np.uint32] | None, more: NDArray[np.float64] | None
 ) -> NDArray[np.float64]:
-    """Returns the extreme points of those points (..., n, 3) that triangles use; None uses all."""
+    """Returns the outline of the points (..., n, 3) that triangles use; None means all points."""
     used = None if triangles is None else _core.used_points(triangles, points.shape[-2])
     points = points if used is None else points[..., used, :]
     return framing.outline(points.reshape(-1, 3), more)

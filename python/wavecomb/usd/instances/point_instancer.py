@@ -57,7 +57,7 @@ def rotations(quaternions: NDArray[Any]) -> Matrices:
 
 
 def are_valid(transforms: Matrices) -> NDArray[np.bool_]:
-    """Returns a mask (k,) that tells which transforms (k, 4, 4) are finite and invertible."""
+    """Returns a mask (k,) of the transforms (k, 4, 4) that are finite and invertible."""
     linear = transforms[:, :3, :3]
     finite: NDArray[np.bool_] = np.asarray((np.abs(transforms) < 1e18).all(axis=(1, 2)))
     a, b, c = np.where(finite[:, None, None], linear, 0.0).transpose(1, 0, 2)
@@ -107,7 +107,8 @@ def moved_instances(
 ) -> Matrices | None:
     """Returns transforms (k, s, 4, 4) of instances over the shutter; None if they are static.
 
-    Velocities, accelerations and angular velocities are used as UsdGeomPointInstancer defines.
+    Velocities, accelerations and angular velocities have the effect that UsdGeomPointInstancer
+    defines.
 
     Args:
         prim: The point instancer.
@@ -154,7 +155,7 @@ def moved_instances(
 def _mask(
     instancer: UsdGeom.PointInstancer, time: Usd.TimeCode, count: int, report: LoadReport
 ) -> NDArray[np.bool_]:
-    """Returns a mask (count,) that tells which instances are visible and active."""
+    """Returns a mask (count,) of the instances that are visible and active."""
     keep = np.ones(count, bool)
     hidden: list[int] = []
     hidden += as_integers(instancer.GetInvisibleIdsAttr().Get(time), np.int64).tolist()

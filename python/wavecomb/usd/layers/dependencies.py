@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lists all files that a stage needs, and files that it names but that do not exist."""
+"""Lists all files that a stage needs, and all files that the stage names but that are missing."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def _add(
 
 
 def _is_library(path: str) -> bool:
-    """Returns whether a path is shader source code, which Wavecomb does not read."""
+    """Returns whether a path names a file of shader source code, which Wavecomb does not read."""
     return path.endswith((".osl", ".oso", ".glslfx", ".args"))
 
 

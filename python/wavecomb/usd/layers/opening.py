@@ -39,7 +39,7 @@ def abort_on_fifo() -> Iterator[None]:
     WavecombError.
 
     Raises:
-        WavecombError: A layer refers to a FIFO, and USD waited for it.
+        WavecombError: A layer refers to a FIFO, and USD waited for data from the FIFO.
     """
     done, found = threading.Event(), _BlockingFifo()
     thread = threading.Thread(target=_watch, args=(done, found), daemon=True)
@@ -123,7 +123,7 @@ class StageContents:
 
     @property
     def may_have_cameras(self) -> bool:
-        """Whether the stage has cameras, or so many lights that cameras may be missing here."""
+        """Whether the stage has cameras, or may have cameras that are missing in the full list."""
         return bool(self.cameras) or len(self.lights) == MAX_SURVEYED
 
 
@@ -353,12 +353,12 @@ def select_variants(stage: Usd.Stage, variants: Mapping[str, str]) -> None:
 
 
 _changed: dict[str, Sdf.Layer] = {}
-"""Layers that this process has changed, by identifier. They are never released, since USD would
-otherwise reload them without the changes."""
+"""Layers that this process has changed, by identifier. These layers are never released, since USD
+would otherwise reload them without the changes."""
 
 
 def change_layers(layers: Iterable[Sdf.Layer]) -> None:
-    """Applies the path maps of this process to layers and to all layers that they refer to.
+    """Applies the path maps of this process to layers and to all layers to which these refer.
 
     Call this function before composition. It changes the absolute paths of layers, textures and
     other files in memory only. Relative paths need no change.

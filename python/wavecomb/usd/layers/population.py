@@ -67,7 +67,7 @@ def _matching(stage: Usd.Stage, pattern: PathPattern) -> list[Sdf.Path]:
 
 
 def _outside_instances(stage: Usd.Stage, path: Sdf.Path) -> Sdf.Path:
-    """Returns the path of the prim, or of the instance around it for prims inside instances."""
+    """Returns the path of a prim or, for a prim inside an instance, the path of the instance."""
     for prefix in path.GetPrefixes():
         if stage.GetPrimAtPath(prefix).IsInstance():
             return prefix

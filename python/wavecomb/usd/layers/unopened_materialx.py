@@ -10,7 +10,7 @@ from typing import Any
 from pxr import Usd
 
 _NAMED = re.compile(r"@([^@]*\.mtlx\]*)@", re.IGNORECASE)
-"""Regular expression for the MaterialX file in USD's message about a layer that it cannot open."""
+"""Regular expression that finds the MaterialX file in USD's message about an unreadable layer."""
 
 
 def unopened_materialx(stage: Usd.Stage) -> Iterator[tuple[Any, str]]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads inputs of light filters under the names of several renderers, and colour gels.
+"""Reads inputs of light filters by the names that several renderers use, and colour gels.
 
 A gel is a filter that multiplies all light of a light source. Supported gels are Karma's
 ``kma_lfilter_gel``, the gel inputs of Karma's barn doors and gobos, and RenderMan's PxrIntMult.
@@ -129,7 +129,7 @@ class Gel:
 
 
 def gel_of(light: Usd.Prim, time: Usd.TimeCode, report: LoadReport) -> Gel:
-    """Combines all gels of a light's filters, even of filters without other support."""
+    """Combines the gels of all filters of a light, including otherwise unsupported filters."""
     gel = Gel()
     for _, prim in filter_prims(light):
         if prim is not None and plain_kind(prim) in _WITH_GEL:

@@ -77,9 +77,9 @@ def blackbody(kelvin: float) -> tuple[float, float, float]:
     """Returns the linear Rec. 709 colour of a black body, with the luminance of white.
 
     Like OpenUSD's Embree delegate, this function uses ``Gf.Color``, which has Krystek's
-    approximation of the Planckian locus. Temperatures are clamped to its range of 1000 to 15000 K.
-    ``UsdLux.BlackbodyTemperatureAsRgb``, a table up to 10000 K, differs by at most 0.002 above 2000
-    K. Negative components (blue below 1900 K) become 0.
+    approximation of the Planckian locus. Temperatures are clamped to the approximation's range of
+    1000 to 15000 K. ``UsdLux.BlackbodyTemperatureAsRgb``, a table up to 10000 K, differs by at most
+    0.002 above 2000 K. Negative components (blue below 1900 K) become 0.
     """
     found = Gf.Color(Gf.ColorSpace(Gf.ColorSpaceNames.LinearRec709))
     found.SetFromPlanckianLocus(min(max(kelvin, 1000.0), 15000.0), 1.0)
@@ -100,7 +100,7 @@ class LightReader:
         profiles: Profiles | None = None,
         links: LinkTable | None = None,
     ) -> None:
-        """Creates a reader; ``textures``, ``profiles`` and ``links`` that are None are not read."""
+        """Creates a reader; any of ``textures``, ``profiles`` and ``links`` is ignored if None."""
         self.time, self.report = context.time, context.report
         self.hidden = context.hides_lights
         self.textures = textures
@@ -173,7 +173,7 @@ class LightReader:
     def _plain(self, prim: Usd.Prim, kind: str) -> dict[str, Any]:
         """Reads parameters that correspond directly to inputs of the light.
 
-        Values that equal their defaults are left out, except those of the light's shape.
+        Values that equal their defaults are left out, except the parameters of the light's shape.
         """
         options = {}
         for row in of_kind(kind):

@@ -97,11 +97,11 @@ class Assigner:
         return assigned
 
     def shared_material(self, draw: DrawItem) -> int | None:
-        """Returns the id of a gprim's material if it is simple: in use, and equal on all gprims.
+        """Returns a gprim's material id if the material is simple: in use, and equal on all gprims.
 
-        Simple materials emit no light, and neither they nor their displacement read any values of
-        the gprim. Returns None for other materials and for gprims with GeomSubsets or with display
-        colours. Assumes that a gprim without a binding takes no material from its instance.
+        A simple material emits no light, and neither the material nor its displacement reads values
+        of the gprim. Returns None for other materials and for gprims with GeomSubsets or with
+        display colours. Assumes that a gprim without a binding takes no material from its instance.
         """
         if draw.subsets:
             return None
@@ -144,7 +144,7 @@ class Assigner:
     def _one_value(self, draw: DrawItem, name: str) -> Any:
         """Returns the value of a primvar on a gprim.
 
-        If the primvar varies, its mean is used and reported.
+        If the primvar varies, its mean is used, and the approximation is reported.
         """
         path = draw.prim.GetPath()
         if (text := _text_of(draw, name, self.time)) is not None:

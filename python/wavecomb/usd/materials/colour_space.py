@@ -99,7 +99,7 @@ def convert(pixels: NDArray[Any], source: str, working: str) -> NDArray[np.float
 
 @functools.cache
 def convert_colour(colour: Colour, source: str, working: str) -> Colour:
-    """Converts one colour like ``convert`` converts images."""
+    """Converts one colour in the same way as ``convert`` converts images."""
     if source in (RAW, OCIO_NAMES[working]):
         return colour
     r, g, b = convert(np.array(colour, np.float32).reshape(1, 1, 3), source, working)[0, 0]
@@ -120,7 +120,7 @@ def to_linear(values: NDArray[Any]) -> NDArray[np.float32]:
 def halve(pixels: NDArray[Any], srgb: bool) -> NDArray[Any]:
     """Halves the size of an image (h, w, c), rounded down, with the mip filter of the core.
 
-    The box filter works on linear values; the result has the type of the input. ``srgb`` tells
+    The box filter works on linear values; the result has the type of the input. ``srgb`` states
     whether uint8 colours are sRGB encoded.
     """
     height, width, channels = pixels.shape

@@ -45,7 +45,8 @@ PREVIEW = "preview"
 """Kind of surface that ``surface_source`` returns for UsdPreviewSurface."""
 
 MIN_EMISSION = 1.0
-"""Smallest emission of a material that counts as a light; such a stage gets no default dome."""
+"""Smallest emission at which a material counts as a light, so that the stage gets no default
+dome."""
 
 _INSTEAD = "displayColor in its place"
 
@@ -56,8 +57,8 @@ SPLATS = Surface("splats", "emissive", {"emission": (1.0, 1.0, 1.0)})
 def surface_source(material: UsdShade.Material) -> tuple[str, UsdShade.Shader]:
     """Returns the kind of a material's surface and its shader.
 
-    The kind is ``PREVIEW`` or a MaterialX shading model. It is empty if Wavecomb supports none of
-    the material's surface outputs.
+    The kind is ``PREVIEW`` or a MaterialX shading model. The kind is empty if Wavecomb supports
+    none of the material's surface outputs.
     """
     shader = material.ComputeSurfaceSource()[0]
     # If a material has a MaterialX surface and a preview surface, use the MaterialX surface.
@@ -242,12 +243,12 @@ class MaterialTable:
         return parameters
 
     def in_use(self, material: UsdShade.Material) -> tuple[Surface, int] | None:
-        """Returns the surface of a material object and its id if meshes use them already."""
+        """Returns a material's surface, and its id if meshes already use the material."""
         known = self._by_object.get(id(material))
         return None if known is None else self._surface_ids.get(id(known[1]))
 
     def plain_in_use(self) -> int | None:
-        """Returns the id of the default display colour if meshes use it already."""
+        """Returns the id of the default display colour if meshes already use that colour."""
         return self._plain.get((*DEFAULT_COLOUR, 1.0))
 
     def paths(self) -> tuple[str, ...]:
@@ -261,7 +262,7 @@ class MaterialTable:
         return bool(np.isin(faces, list(self._emitting)).any())
 
     def mean_emission(self, material: int) -> float:
-        """Returns the mean luminance that a material emits; 0 if it is too low to count as a light.
+        """Returns the mean luminance that a material emits; 0 if too low to count as a light.
 
         Textures contribute the mean of their files, and primvars their highest value.
         """

@@ -49,7 +49,8 @@ class Source:
 def source_of(shader: UsdShade.Shader, name: str, time: Usd.TimeCode) -> Source | None:
     """Returns the source of an input; None if the input is not set or its connection is invalid.
 
-    Connections to inputs of other shaders are followed, which UsdShade does for containers only.
+    Connections to inputs of other shaders are followed, whereas UsdShade follows only connections
+    to inputs of containers.
     """
     shader_input = shader.GetInput(name)
     return _source_of(shader_input, time, MAX_DEPTH) if shader_input else None
@@ -82,7 +83,7 @@ def value_of(shader: UsdShade.Shader, name: str, time: Usd.TimeCode, default: An
 
 
 def layer_of_value(attribute: Usd.Attribute | None) -> Sdf.Layer | None:
-    """Returns the layer with the strongest value of an attribute, to which relative paths refer.
+    """Returns the layer with an attribute's strongest value, to which relative paths refer.
 
     Layers whose stronger opinions have only metadata or a connection are skipped.
     """
@@ -252,8 +253,8 @@ class InputValues:
     ) -> Any:
         """Returns the value of an input, or the default if the input is not set.
 
-        Inputs that vary over the surface are reported, and inputs that read a primvar unless
-        ``by_object`` is set.
+        Reports inputs that vary over the surface and, unless ``by_object`` is set, inputs that read
+        a primvar.
         """
         source = source_of(shader, name, self._time)
         if source is None:

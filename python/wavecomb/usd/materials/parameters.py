@@ -2,8 +2,8 @@
 """Editable parameters of materials and lights, with the attributes that hold them.
 
 The module ``wavecomb.usd.materials.material`` reads surfaces. This module finds the attribute that
-holds each constant, so that programs such as the viewer can write changes to the stage. It also
-reads the constants of a MaterialX material without reading images.
+holds each constant, so that programs such as the viewer can write changes to the stage. This module
+also reads the constants of a MaterialX material without reading images.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class Parameter:
         type_name: Type of the attribute.
         driven_by: Source of a value that is not constant, such as "texture marble.png" or "primvar
             displayColor"; empty for a constant.
-        reason: Reason why the parameter cannot be edited; empty if it can.
+        reason: Reason why the parameter cannot be edited; empty if it can be edited.
         definition: MaterialX definition of the input; None for UsdPreviewSurface.
     """
 

@@ -40,7 +40,7 @@ class Image:
         dtype: Type of the pixel values.
         stamp: Stamp of the file before it was read; None if unknown.
         wraps: Wrap modes in s and t that the file declares: black, clamp, repeat or mirror.
-        encoded: Whether the file declares sRGB encoding; None if the file does not tell.
+        encoded: Whether the file declares sRGB encoding; None if the file declares no encoding.
     """
 
     def __init__(
@@ -60,7 +60,7 @@ class Image:
 
     @property
     def is_here(self) -> bool:
-        """Whether the pixels have not been released."""
+        """Whether the image still holds its pixels."""
         return self._pixels is not None
 
     def take(self) -> NDArray[Any]:
@@ -146,7 +146,7 @@ _BY_ENDING = (".jp2", ".j2k", ".j2c", ".jph")
 def _unpacked(data: Any, name: str) -> Iterator[str]:
     """Yields the name of a temporary file with the contents of a file in a package.
 
-    The file is in anonymous memory where possible, so that it vanishes if the process is killed.
+    If possible, the file is in anonymous memory, so that it vanishes if the process is killed.
     """
     ending = Path(name).suffix.lower()
     if ending not in _BY_ENDING and hasattr(os, "memfd_create"):

@@ -123,7 +123,7 @@ class Surface:
         graph: Graph of parameters that are neither constants nor plain textures.
         texture_uvs: UV primvar of each textured parameter that does not use the first of
             ``uv_names``.
-        object_reads: Names of primvars whose value on an object changes how textures are read.
+        object_reads: Names of primvars whose value on an object affects texture lookups.
             The material is read once for each set of values.
         stand_in: Whether this surface replaces a material that cannot be rendered. A display
             colour of the bound prim then takes precedence.

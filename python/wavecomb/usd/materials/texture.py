@@ -105,7 +105,7 @@ def texture_store(
 ) -> _core.TextureStore | None:
     """Returns the store that keeps textures within ``limit`` MB; None if there is no limit.
 
-    If ``reuse`` has a store with this limit, it is returned, so that the limit includes reused
+    If ``reuse`` has a store with this limit, returns that store, so that the limit includes reused
     textures.
 
     Raises:
@@ -348,7 +348,7 @@ class TextureTable:
                 give_back_memory()
 
     def mean(self, number: int) -> NDArray[np.float64]:
-        """Returns the linear mean (4,) of a texture by reading its file again, or 1."""
+        """Reads a texture's file again and returns its linear mean (4,); 1 if that fails."""
         key = next((key for key, known in self._ids.items() if known == number), ())
         # The keys of UDIM textures have three elements.
         if len(key) == 3:

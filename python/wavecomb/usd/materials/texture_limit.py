@@ -2,9 +2,9 @@
 """Keeps the textures of a stage within a memory limit by leaving out mip levels.
 
 Before loading, the module reads the headers of all image files and computes the memory of their
-textures. While the sum exceeds the limit, it removes the finest mip level of the texture with the
-most texels per image pixel. Renders therefore do not wait for files, and the same stage, view and
-limit always give the same image.
+textures. While the sum exceeds the limit, the module removes the finest mip level of the texture
+with the most texels per image pixel. Renders therefore do not wait for files, and the same stage,
+view and limit always give the same image.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reads MaterialX documents as layers in memory, with their node graphs and surface shaders.
 
-Other packages use it through ``wavecomb.usd.mtlx``.
+Other packages use this package only through ``wavecomb.usd.mtlx``.
 """

@@ -41,7 +41,8 @@ class Document:
     """A document that refers to MaterialX's standard library.
 
     Attributes:
-        root: MaterialX's document object. It has access to the definitions of the standard library.
+        root: MaterialX's document object. The object has access to the definitions of the standard
+            library.
         file: The file that was requested.
         graphs: Node graphs of the document, without the library's node graphs.
         definitions: Names of the document's node definitions, without the library's definitions.
@@ -169,7 +170,7 @@ def resolve(name: str, anchor: str) -> str:
 
 
 def beside(name: str, anchor: str) -> str:
-    """Returns the path of a file name in a file, relative to that file unless absolute."""
+    """Resolves a file name relative to the file that contains the name, unless it is absolute."""
     if os.path.isabs(name) or "://" in name:
         return mapped(name, own_maps())
     if Ar.IsPackageRelativePath(anchor):
@@ -185,7 +186,7 @@ def image_file(value: Any, document: str) -> tuple[str, bool]:
     """Returns the file of a filename element, and whether ``fileprefix`` was ignored.
 
     File names are relative to the document or else to the file that contains the element. The
-    attribute ``fileprefix`` is ignored if the file exists without the prefix but not with it.
+    attribute ``fileprefix`` is ignored if a file exists only under the name without the prefix.
 
     Args:
         value: The element with the file name.

@@ -106,7 +106,7 @@ class Graphs:
         return GRAPHS
 
     def _loose(self) -> list[Any]:
-        """Returns nodes outside of graphs, except materials and shaders that they alone use."""
+        """Returns nodes outside of graphs, except materials and shaders that only materials use."""
         nodes = self._document.root.getNodes()
         used = {
             item.getNodeName()

@@ -38,7 +38,7 @@ def library() -> Any:
 
 @dataclass(frozen=True)
 class PortSource:
-    """Source of a node input or graph output, which is a value, a graph input or a node's output.
+    """Source of a node input or graph output: a value, a graph input or a node's output.
 
     Attributes:
         type: Name of the MaterialX type of the value.

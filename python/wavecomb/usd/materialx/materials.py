@@ -43,7 +43,7 @@ def write_looks(document: Document, layer: Sdf.Layer, report_skipped: ReportSkip
 
 
 class _LooksWriter:
-    """Writer of collections and looks; each of them is written only once."""
+    """Writer of collections and looks; each one is written only once."""
 
     def __init__(self, root: Any, stage: Usd.Stage, report_skipped: ReportSkipped) -> None:
         self._root = root

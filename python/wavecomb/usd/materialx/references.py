@@ -182,12 +182,12 @@ ROOT = Sdf.Path("/MaterialX")
 
 
 def translate(file: str) -> tuple[Sdf.Layer, LoadReport]:
-    """Translates a file to a layer; returns it with a report of what was not translated.
+    """Translates a file to a layer; also returns a report of the parts that were not translated.
 
-    File names in the translated layer are absolute, so that it can be used anywhere.
+    File names in the translated layer are absolute, so that the layer can be used anywhere.
 
     Args:
-        file: Path as resolved by Ar.
+        file: Path that OpenUSD's asset resolver (Ar) returned.
 
     Raises:
         MtlxError: The file cannot be read.

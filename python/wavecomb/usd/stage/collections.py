@@ -13,8 +13,7 @@ from wavecomb.usd.materials.draw_item import Parent
 from wavecomb.usd.stage.report import LoadReport, first_message
 
 Rules = dict[str, str]
-"""Rule for a prim path: exclude, explicit (only this prim) or expand (also all descendants).
-"""
+"""Rule for a prim path: exclude, explicit (only this prim) or expand (also all descendants)."""
 
 MAX_PRIMS = 1 << 20
 """Maximum number of prims at which an expression is evaluated; nested instancing may create

@@ -35,7 +35,7 @@ DEEP = 256
 """Maximum depth of prims that are considered, because USD computes transforms recursively."""
 
 WORLD: Origin = (0.0, 0.0, 0.0)
-"""The world's origin, which is used if the camera is close to it."""
+"""The world's origin, which is also the scene's origin if the camera is near."""
 
 
 def find_origin(
@@ -64,7 +64,7 @@ def find_origin(
 def _places(stage: Usd.Stage, time: Usd.TimeCode, purposes: frozenset[str]) -> NDArray[np.float64]:
     """Returns world positions (n, 3) of drawn prims: centres of extents, else prim origins.
 
-    USD's own bounds need every point, and crash on arrays that do not fit together.
+    USD's bounds computation would read every point, and would crash on inconsistent arrays.
     """
     xforms = UsdGeom.XformCache(time)
     found = []
@@ -88,7 +88,7 @@ def _is_drawn(prim: Usd.Prim) -> bool:
 
 
 def _snapped(place: NDArray[np.float64]) -> Origin:
-    """Rounds a position to a scene origin; returns ``WORLD`` if it is near 0 or not finite."""
+    """Rounds a position to a scene origin; positions near 0 or not finite give ``WORLD``."""
     if not np.isfinite(place).all() or np.abs(place).max() < NEAR:
         return WORLD
     x, y, z = np.round(place / CELL) * CELL + 0.0
@@ -96,7 +96,7 @@ def _snapped(place: NDArray[np.float64]) -> Origin:
 
 
 def world_to_scene(origin: Origin) -> Gf.Matrix4d:
-    """Returns the transform from the world to the scene; ``IDENTITY`` itself for ``WORLD``."""
+    """Returns the transform from the world to the scene; for ``WORLD``, the object ``IDENTITY``."""
     if origin == WORLD:
         return IDENTITY
     return Gf.Matrix4d(1.0).SetTranslate(-Gf.Vec3d(*origin))

@@ -103,7 +103,7 @@ class DrawModes:
         return self._cards(prim, box)
 
     def _path(self, prim: Usd.Prim) -> Sdf.Path:
-        """Returns a stand-in's path; a prototype's path becomes that of its first instance."""
+        """Returns a stand-in's path, with a prototype's path replaced by its first instance's."""
         return Sdf.Path(self._report.place(prim.GetPath()))
 
     def _extent(self, prim: Usd.Prim) -> np.ndarray | None:

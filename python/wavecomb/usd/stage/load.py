@@ -86,7 +86,7 @@ def load_stage(
             shared. The cache does not change the image.
         progress: Called with the number of prims read and the number found so far.
         builder_factory: Creates a scene builder without a texture store, for tests.
-        **changes: Fields of ``LoadOptions`` that replace those of ``options``.
+        **changes: Fields of ``LoadOptions`` that replace the fields of ``options``.
 
     Raises:
         WavecombError: The file or an option is invalid.
@@ -294,7 +294,7 @@ class _Load:
         return StrandDetail(ViewSize(view, c.options.size), c.options.strand_pixels, c.report)
 
     def _limit_textures(self, settings: ViewSettings) -> None:
-        """Chooses how many of the finest mip levels of each texture are not loaded."""
+        """Chooses the number of finest mip levels of each texture that are not loaded."""
         from wavecomb.usd.materials.texture_limit import plan_levels
 
         c = self._context

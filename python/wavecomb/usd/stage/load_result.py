@@ -33,9 +33,9 @@ class LoadedStage:
         stage_path: The file of the stage.
         cameras: Prims of all selectable cameras.
         lights: Prims of all supported lights, including invisible ones.
-        material_paths: Prim of each material of the scene by id; "" if the loader created it, for
-            example from a display colour. A material prim has several ids if meshes provide
-            different primvars.
+        material_paths: Prim of each material of the scene by id; "" if the loader created the
+            material, for example from a display colour. A material prim has several ids if meshes
+            provide different primvars.
         light_paths: Prim of each light of the scene by index; "" for the default dome light.
             Materials and lights in instances are named after the first instance.
         frame: Time code that was read; None for default values.

@@ -68,7 +68,7 @@ class LoadReport:
 
     Attributes:
         notes: Choices and approximations, such as "no camera: framed what is drawn".
-        warnings: Errors in the stage and how they were handled.
+        warnings: Errors in the stage, and the way in which they were handled.
         unsupported: Features of the stage that Wavecomb does not support.
         counts: Number of prims read, by kind.
     """
@@ -83,7 +83,7 @@ class LoadReport:
         self._aliases.setdefault(str(prototype), self.place(instance))
 
     def place(self, place: object) -> str:
-        """Returns the path of a prim as the user knows it."""
+        """Returns the path by which the user knows a prim."""
         path = str(place)
         if not path.startswith("/__Prototype_"):
             return path
@@ -117,7 +117,7 @@ class LoadReport:
             self.tally(kind, count)
 
     def absorb_new(self, other: LoadReport) -> None:
-        """Adds messages of another report, except where a location already has the same message."""
+        """Adds messages of another report, except for locations that already have this message."""
         for level, findings in other._found.items():
             for what, finding in findings.items():
                 known = self._found[level].get(what)
@@ -255,9 +255,9 @@ def capture_diagnostics(report: LoadReport) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _hooked(report: LoadReport) -> Iterator[None]:
-    """Adds exceptions to the report that USD's C++ code catches from Python and prints.
+    """Adds to the report the Python exceptions that USD's C++ code catches and prints.
 
-    Values of types that Python does not know cause such exceptions.
+    Such exceptions occur for values whose types Python does not know.
     """
     before = sys.excepthook
 

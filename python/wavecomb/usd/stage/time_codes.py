@@ -7,7 +7,10 @@ from pxr import Usd
 
 
 def time_code(stage: Usd.Stage, frame: float | None) -> Usd.TimeCode:
-    """Returns the time code of a frame; None means the stage's start, or else earliest samples."""
+    """Returns a frame's time code.
+
+    For None, returns the stage's start or, without a time range, the earliest time.
+    """
     if frame is not None:
         return Usd.TimeCode(frame)
     if stage.HasAuthoredTimeCodeRange():

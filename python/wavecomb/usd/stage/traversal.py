@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Traverses prims of a stage and collects what is to be rendered."""
+"""Traverses the prims of a stage and collects the prims that will be rendered."""
 
 from __future__ import annotations
 
@@ -165,8 +165,8 @@ class Traversal:
         """Collects the prims at and below some roots, in stage order.
 
         Args:
-            roots: Prims to start from; transforms include those of the roots, but not those of
-                their parents.
+            roots: Prims to start from; transforms include the roots' transforms, but not their
+                parents' transforms.
             purpose: Purpose of the roots' parents.
             predicate: Predicate of the children to visit; None is USD's default.
             inherited: Constant primvars that the roots inherit.

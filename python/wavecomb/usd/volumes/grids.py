@@ -76,10 +76,11 @@ class VolumeFacts:
 
 
 _SLIGHTLY = 1e-3
-"""Tolerated negative values, relative to a grid's maximum; resampling filters produce them."""
+"""Tolerance for negative values, relative to a grid's maximum; resampling filters produce such
+values."""
 
 _WARM = ("temperature", "heat", "flame", "flames", "fire", "fuel")
-"""Names of fields that are not used as density if the volume has another field."""
+"""Names of fields that serve as density only if the volume has no other field."""
 
 _CHUNK = 4096
 """Number of bricks that are processed together."""
@@ -319,8 +320,8 @@ _FIRST, _LAST, _COUNT = 1000.0, 15000.0, 512
 def radiance(kelvin: NDArray[Any]) -> NDArray[np.float32]:
     """Returns black-body radiance in linear Rec.709 (..., 3), with luminance sigma T^4 / pi in MW.
 
-    The unit is that of Cycles: the luminance is 1 at 2729 K and 11.3 at 5000 K. Below 1000 K the
-    chromaticity of 1000 K is used.
+    The unit is the same as in Cycles: the luminance is 1 at 2729 K and 11.3 at 5000 K. Below 1000 K
+    the chromaticity of 1000 K is used.
     """
     hot = np.clip(np.asarray(kelvin, np.float64), 0.0, _HOTTEST)
     strength = (STEFAN_BOLTZMANN * 1e-6 / np.pi) * hot**4

@@ -47,7 +47,7 @@ class OpticalProperties:
         density: Name of a field; "" means the field named density, or the first scalar field.
         colour: Name of the field that multiplies the albedo, or "".
         emission_field: Name of a field; "" means the density field.
-        kelvin: Temperature of value 1 in ``emission_field``; 0 if it does not hold temperatures.
+        kelvin: Temperature of value 1 in ``emission_field``; 0 if the field holds no temperatures.
         name: Name of the material for messages.
     """
 
@@ -63,8 +63,7 @@ class OpticalProperties:
 
 
 DEFAULT_PROPERTIES = OpticalProperties()
-"""Properties of a volume without material: white smoke, extinction 1 per stage unit.
-"""
+"""Properties of a volume without material: white smoke, extinction 1 per stage unit."""
 
 
 def product(a: Colour, b: Colour) -> Colour:

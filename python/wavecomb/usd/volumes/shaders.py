@@ -185,7 +185,7 @@ STANDARD = ("arnold:standard_volume", "standard_volume")
 
 _HALF = (0.5, 0.5, 0.5)
 _OPAQUE = 1e-4
-"""Smallest transparency; it gives an extinction coefficient of 9.2 / ``transparent_depth``."""
+"""Smallest transparency, which gives an extinction coefficient of 9.2 / ``transparent_depth``."""
 
 
 def read_standard(shader: UsdShade.Shader, inputs: Inputs) -> OpticalProperties:

@@ -34,7 +34,7 @@ class Volume:
         options: Arguments of ``SceneBuilder.add_volume`` except ``to_world``.
         corners: (8, 3) corners of the volume's bounds in object space.
         grids: Descriptions of the volume's grids.
-        may_light: Whether the volume may light a scene by its emission.
+        may_light: Whether the volume's emission may be strong enough to light a scene.
     """
 
     options: dict[str, Any]
@@ -47,7 +47,7 @@ class VolumeReader:
     """Reader of the volumes of one stage.
 
     Attributes:
-        may_light: Whether a volume may light the scene by its emission.
+        may_light: Whether the emission of any volume may be strong enough to light the scene.
     """
 
     def __init__(self, context: LoadContext) -> None:

@@ -25,7 +25,7 @@ from wavecomb.run import expressions
 from wavecomb.run.error_messages import describe
 
 OWN = "custom"
-"""Entry of the box of named expressions for an expression without a name."""
+"""Entry of the combo box of named expressions that stands for any other expression."""
 
 
 def aovs_with(setup: Setup, name: str, text: str) -> tuple[str, ...]:
@@ -39,7 +39,7 @@ def aovs_with(setup: Setup, name: str, text: str) -> tuple[str, ...]:
 
 
 def problem_of(setup: Setup, name: str, text: str, groups: Sequence[str]) -> str:
-    """Returns why an expression cannot be rendered as a layer, or "" if it can.
+    """Returns the reason why an expression cannot be rendered as a layer, or "" if it can.
 
     Args:
         setup: Setup of the render.

@@ -40,7 +40,7 @@ _SEEN = (
 
 
 def value_text(value: Any) -> str:
-    """Formats a number, several numbers or a name for people.
+    """Formats a number, several numbers or a name for display.
 
     >>> value_text(0.25), value_text((1.0, 0.5, 2e-7)), value_text(3)
     ('0.25', '1  0.5  2e-07', '3')

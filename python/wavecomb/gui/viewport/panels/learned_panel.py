@@ -20,12 +20,12 @@ from wavecomb.image.directions import density_map, map_point
 _LATER_MS = 40
 _HEIGHT = 128
 MOST_LIGHTS = 12
-"""Largest number of lights that the panel shows as separate bars. All other lights are added up in
-one bar."""
+"""Largest number of lights that the panel shows as separate bars. One bar shows the sum of all
+other lights."""
 
 
 def field_text(setup: Setup, learned: dict[str, Any] | None) -> str:
-    """Describes the guiding field at a surface point, or says why there is no guiding.
+    """Describes the guiding field at a surface point, or gives the reason why there is none.
 
     Args:
         setup: Setup of the render.

@@ -31,7 +31,7 @@ _ROWS: dict[str, tuple[str, dict[str, Any]]] = {
     "firefly": ("&Fireflies", {}),
     "clamp_indirect": ("C&lamp", {}),
 }
-"""Label of each setting, and display options that differ from those in the Scheduling panel."""
+"""For each setting, its label and those display options that differ from the Scheduling panel's."""
 _CHOICES = ("guiding", "transport", "firefly")
 _TEXTS = {"path": "camera paths", "light": "light paths", "bdpt": "both, connected"}
 _NAMES = {"max_depth": "depth"}

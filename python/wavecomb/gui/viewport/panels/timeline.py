@@ -77,7 +77,10 @@ class Timeline(QWidget):
         set_quietly(self.frame, frame)
 
     def _choose(self, frame: int) -> None:
-        """Shows a frame of the animation. While playing or dragging, the image is reduced."""
+        """Shows a frame of the animation.
+
+        The image is reduced while the timeline plays or is dragged.
+        """
         self._waiting = True
         self._session.show_time(frame, moving=self.is_playing or self.slider.isSliderDown())
         self._show(frame)

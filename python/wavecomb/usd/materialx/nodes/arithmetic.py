@@ -204,7 +204,7 @@ def identity(size: int) -> tuple[float, ...]:
 
 @_node("transformmatrix")
 def _transform(n: NodeCall) -> Value:
-    """Multiplies a row vector by a matrix; appends 1 if the vector has one component too few.
+    """Multiplies a row vector by a matrix; appends 1 to a vector that is short by one component.
 
     Additional components of the result are dropped without a perspective division.
     """

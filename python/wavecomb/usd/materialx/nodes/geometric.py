@@ -126,8 +126,8 @@ def _dots(m: Expressions, vectors: list[Value], v: Value) -> Value:
 def _tangent_of_object(m: Expressions, normal: Value) -> Value:
     """Converts an object-space normal to tangent space.
 
-    The shading normal faces the viewer; if it was flipped, the normal of the map is flipped as
-    well.
+    The shading normal faces the viewer; if the normal was flipped for this, the map's normal is
+    also flipped.
     """
     there = unit(m, weighted_sum(m, _rows(m), fit(normal, 3)))
     frame = [m.input(name) for name in ("tangent", "bitangent", "normal")]
@@ -184,7 +184,7 @@ def _transform_point(n: NodeCall) -> Value:
 
 
 def _point(n: NodeCall) -> Value:
-    """Returns texture coordinates for 2D nodes, whose category ends in "2d", else the position."""
+    """Returns texture coordinates for nodes whose category ends in "2d", else the position."""
     if n.category.endswith("2d"):
         return n.coordinates()
     return n.place("position", "position", "object")
@@ -226,7 +226,7 @@ def _worley(n: NodeCall) -> Value:
 
 @_node("ramplr", "ramptb", "splitlr", "splittb")
 def _ramp(n: NodeCall) -> Value:
-    """Interpolates or splits values along u, or along v where v = 1 is the top."""
+    """Interpolates or splits values along u, or along v with v = 1 at the top."""
     m, (u, v) = n.make, n.coordinates()
     names, at = (("valuel", "valuer"), (u,)) if n.category[-2:] == "lr" else (
         ("valueb", "valuet"), (v,)

@@ -2,8 +2,8 @@
 """Handlers for MaterialX image nodes, including hex-tiled images and normal maps.
 
 Hex tiling blends three copies of the image at each point, which are randomly rotated, scaled and
-shifted. It follows M. Mikkelsen, "Practical Real-Time Hex-Tiling", JCGT 11(2), 2022, with the
-weights and the hash function of MaterialX's code.
+shifted. The implementation follows M. Mikkelsen, "Practical Real-Time Hex-Tiling", JCGT 11(2),
+2022, with the weights and the hash function of MaterialX's code.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _WRAPS = {
 
 
 def stretch_of(uv: Value) -> float:
-    """Returns the scale from mesh to node texture coordinates; 1 if the scale varies."""
+    """Returns the scale from the mesh's to the node's texture coordinates; 1 if it varies."""
     m = uv_matrix(uv)
     if m is None:
         return 1.0
@@ -53,7 +53,8 @@ def read_image(
         wraps: Wrap modes in u and v.
         fallback: Name of the input whose value replaces a missing image.
         is_raw: Whether the file holds data rather than colours.
-        stretch: Scale from the mesh's texture coordinates to ``uv``; None computes it from ``uv``.
+        stretch: Scale from the mesh's texture coordinates to ``uv``; None computes the scale from
+            ``uv``.
         name: Name of the input that holds the file.
         space: Colour space in an input of the node, or an empty string.
     """

@@ -57,7 +57,7 @@ _FIRST_CHOICES = (
 def category_of(identifier: str) -> tuple[str, int]:
     """Returns node category and output width, such as ("mix", 3) for ``ND_mix_color3``.
 
-    The width is 0 if the definition's name does not tell the width.
+    The width is 0 if it cannot be derived from the definition's name.
     """
     words = identifier.removeprefix("ND_").split("_")
     at = next((n for n in range(len(words), 0, -1) if "_".join(words[:n]) in CATEGORIES), 0)

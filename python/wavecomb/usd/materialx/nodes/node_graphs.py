@@ -31,7 +31,7 @@ NOT_NUMBERS = ("string", "filename", "geomname")
 
 
 _PLACES = ("texcoord", "st", "position", "normal", "index", "octaves", "style")
-"""Names of inputs that are read as plain numbers, whatever the node's output is used for."""
+"""Names of inputs that are read as plain numbers, independent of the use of the node's output."""
 
 
 def _kind(category: str, name: str, kind: str) -> str:
@@ -121,7 +121,7 @@ class ExpandedGraph:
         return None if value is None else Source(value=value)
 
     def is_given(self, feed: PortSource) -> bool:
-        """Returns whether the source of an input is set; False if it is a default."""
+        """Returns whether the source of an input is set, as opposed to a default."""
         return self.call.inputs.has(feed.interface) if feed.interface else True
 
 

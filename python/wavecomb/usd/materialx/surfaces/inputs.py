@@ -109,7 +109,7 @@ def _definition(one: Any, model: str) -> InputDefinition:
 
 
 def _is_number(model: str, name: str) -> bool:
-    """Returns whether Wavecomb reads a colour input as one number, as it does for opacity."""
+    """Returns whether Wavecomb reads a colour input as one number, as in the case of opacity."""
     return MODELS[model].textured["opacity"].input == name
 
 

@@ -59,7 +59,7 @@ class Model:
         textured: Parameters that plain textures may drive, with their sources.
         normal: Input with the shading normal.
         layers: All other parameters, by the names of ``add_material(openpbr=...)``.
-        ignored: Inputs without effect, which are reported where they are authored.
+        ignored: Inputs without effect, which are reported if they are authored.
     """
 
     textured: dict[str, Row]
