@@ -236,7 +236,8 @@ TEST(Equiangular, DrawsByItsDensity) {
   const auto none =
       equiangular_distribution<float>(scene->view().lights, {o, d, 2, 1, 0.5f}, {}, true);
   EXPECT_EQ(none.share, 0.f);
-  // Where the medium absorbs most of the light, distances are sampled by density.
+  // Where the medium absorbs most of the light, distances are sampled in proportion to the
+  // extinction.
   const auto thick = equiangular_distribution<float>(scene->view().lights, {o, d, 1, 2.4f, 50.f},
                                                      {0.9f, 0.3f, 0.8f, 0.f}, true);
   EXPECT_EQ(thick.share, 0.f);

@@ -324,7 +324,7 @@ def applied(tree: Path, change: Change) -> None:
 def compiled(
     tree: Path, compiler: list[str], *files: str, text: str = ""
 ) -> subprocess.CompletedProcess[str]:
-    """Checks the syntax of named files of a source tree, or of a text."""
+    """Checks the syntax of the named files of a source tree, or of the C++ text `text`."""
     (tree / "use.cpp").write_text(text)
     found = [path for file in files for path in (tree / CORE).rglob(file)]
     assert len(found) == len(files)

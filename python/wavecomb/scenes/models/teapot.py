@@ -110,8 +110,8 @@ def _swept(rows: FloatArray) -> FloatArray:
         for sign in (1.0, -1.0):
             y = np.stack([zero, sign * half, sign * half, zero], axis=1)
             patch = np.stack([x, y, z], axis=2)
-            # The half of the tube at negative y is reversed, so that the two halves form one full
-            # turn with the same orientation.
+            # The half of the tube at negative y has its points in reverse order, so that the two
+            # halves form one full turn with the same orientation.
             patches.append(patch[:, ::-1] if sign < 0.0 else patch)
     return np.array(patches) + 0.0
 

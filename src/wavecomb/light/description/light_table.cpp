@@ -119,7 +119,7 @@ std::vector<LightParameter> shape_rows() {
       all(kEmission,
           positive(row<&L::color>("color", "colour", "color",
                                   "Emitted radiance of the light in W / (m^2 sr): colour * "
-                                  "intensity * 2^exposure * colour temperature."),
+                                  "intensity * 2^exposure * colour of the temperature."),
                    1)),
       in(kShape, positive(row<&L::width>("width", "width", "width",
                                          "Size of the light along x, in local units."),
@@ -267,7 +267,7 @@ std::vector<LightParameter> other_rows() {
       in(kShape,
          row<&L::portals>("portals", "portals", "",
                           "Transforms (k, 4, 4) from the unit square in the xy plane to k openings "
-                          "towards which a dome is sampled; their -z sides receive the light.")),
+                          "towards which a dome is sampled. They transmit light towards -z.")),
       in(kEmission,
          choice(
              row<&L::sync>("material_sync", "material sync", "",

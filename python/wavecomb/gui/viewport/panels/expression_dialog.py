@@ -25,7 +25,7 @@ from wavecomb.run import expressions
 from wavecomb.run.error_messages import describe
 
 OWN = "custom"
-"""Entry of the combo box of named expressions that stands for any other expression."""
+"""Entry of the combo box for expressions without a name, which the user types."""
 
 
 def aovs_with(setup: Setup, name: str, text: str) -> tuple[str, ...]:
