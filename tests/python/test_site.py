@@ -216,6 +216,11 @@ def test_reference_pages_have_every_row(monkeypatch: pytest.MonkeyPatch) -> None
         assert re.search(rf"^\| `{name}` \|.*\w", pages["loading.md"], flags=re.M), name
     for name in wavecomb.__all__:
         assert name == "__version__" or f"## wavecomb.{name}\n" in pages["python.md"]
+    for name in ("SceneBuilder.add_mesh", "scenes.cornell", "Renderer.edit"):
+        assert f"### {name}\n" in pages["python.md"]
+    assert "| `triangles` | `int` | Number of triangles" in pages["python.md"]
+    no_code = re.sub(r"^```.*?^```$", "", pages["python.md"], flags=re.DOTALL | re.MULTILINE)
+    assert not re.search(r"^\*\*\w+\*\*\n\n    ", no_code, flags=re.MULTILINE)
     assert "| `wavecomb/scene/scene.h` |" in pages["cpp.md"]
     assert "| Exception for errors that invalid input causes. |" in pages["cpp.md"]
     for command in ("render", "farm submit", "bench run", "doctor", "sheet"):
@@ -224,6 +229,9 @@ def test_reference_pages_have_every_row(monkeypatch: pytest.MonkeyPatch) -> None
     assert len(rows) > 200
     for row in rows:
         assert len(row) == 4 and len(row[0]) < 36, row  # a narrow first column
+    used = pages["options.md"].index("**Most used**")
+    assert used < pages["options.md"].index("| `--size`") < pages["options.md"].index("**Camera**")
+    assert "RANGE`, 0" not in pages["options.md"] and "&lt;x" not in pages["options.md"]
     assert any(row[0] == "| `--seed`" and "`N`" in row[1] and "0" in row[3] for row in rows)
     for name, text in pages.items():
         widths = {line.replace("\\|", "").count("|") for line in text.splitlines()
@@ -244,6 +252,7 @@ def test_the_site_is_built_without_warnings(tmp_path: Path) -> None:
     assert '<script src="iframe-worker.js"' in home and "unpkg.com" not in home
     if shutil.which("doxygen"):
         assert (tmp_path / "cpp/classwavecomb_1_1SceneBuilder.html").is_file()
+        assert "../reference/cpp.html" in (tmp_path / "cpp/menudata.js").read_text("utf-8")
         assert "cpp/annotated.html" in (tmp_path / "reference/cpp.html").read_text("utf-8")
     browser = shutil.which("chromium")
     if browser:

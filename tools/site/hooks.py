@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+import functools
 import re
 import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -29,12 +31,18 @@ DOXYGEN = {
     "HTML_TIMESTAMP": "NO", "SORT_MEMBER_DOCS": "NO", "SHOW_INCLUDE_FILES": "NO",
 }  # fmt: skip
 """Settings of Doxygen, except paths."""
+BACK = (
+    '<tab type="mainpage" visible="no" title=""/>'
+    '<tab type="user" visible="yes" url="../reference/cpp.html" title="Documentation"/>'
+)
+"""Tab of Doxygen's pages that leads to the site, instead of an empty main page."""
 STYLE = """
 .md-typeset table:not([class]) { font-size: .68rem; }
 .md-typeset img { border-radius: 2px; }
 .md-typeset img[src$=".svg"] { background: #f7f7f4; }
 .md-typeset td:first-child code { white-space: nowrap; }
 .md-typeset td:not(:first-child) code { white-space: normal; overflow-wrap: break-word; }
+.md-typeset pre > code { white-space: pre-wrap; overflow-wrap: anywhere; }
 .md-grid { max-width: 68rem; }
 """
 
@@ -76,8 +84,16 @@ def on_post_build(config: Any) -> None:
         "STRIP_FROM_PATH": f'"{ROOT}/src"',
         "STRIP_FROM_INC_PATH": f'"{ROOT}/src"',
     }
-    text = "".join(f"{name} = {value}\n" for name, value in settings.items())
-    subprocess.run(["doxygen", "-"], input=text, text=True, check=True, stdout=subprocess.DEVNULL)
+    with tempfile.TemporaryDirectory() as scratch:
+        layout = Path(scratch, "layout.xml")
+        run = functools.partial(subprocess.run, text=True, check=True, stdout=subprocess.DEVNULL)
+        run(["doxygen", "-l", str(layout)])
+        first, count = re.subn(r'<tab type="mainpage"[^>]*>', BACK, layout.read_text("utf-8"))
+        assert count == 1, "the layout of Doxygen has a main page"
+        layout.write_text(first, "utf-8")
+        settings["LAYOUT_FILE"] = f'"{layout}"'
+        text = "".join(f"{name} = {value}\n" for name, value in settings.items())
+        run(["doxygen", "-"], input=text)
 
 
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str:

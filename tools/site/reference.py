@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import Any
 
 import click
+from python_page import python_page
 
-import wavecomb
 from wavecomb.cli import main
+from wavecomb.cli.command import OTHERS, grouped
 from wavecomb.core_table import camera_parameters, light_parameters, material_parameters
 from wavecomb.load_options import LoadOptions, rows
 from wavecomb.options import default_text, settings
@@ -79,14 +80,25 @@ def options_page() -> str:
         parts.append(f"## wavecomb {path}\n")
         text = inspect.cleandoc(command.help or "").replace("\b\n", "").partition("\f")[0]
         parts.append(f"{cell(text.partition(chr(10) + chr(10))[0])}\n")
-        body = []
-        for one in command.get_params(context):
-            record = one.get_help_record(context)
-            if record is not None and record[1] and "--help" not in one.opts:
-                body.append(option_row(*record))
-        if body:
-            parts.append(table(("option", "value", "effect", "default"), body))
+        for title, options in groups_of(command, context):
+            records = [one.get_help_record(context) for one in options]
+            body = [option_row(*record) for record in records if record and record[1]]
+            if body:
+                parts += [f"**{title}**\n"] if title else []
+                parts.append(table(("option", "value", "effect", "default"), body))
     return "\n".join(parts)
+
+
+def groups_of(command: Any, context: click.Context) -> list[tuple[str, list[Any]]]:
+    """Return arguments and options of a command in the groups of its help, with their titles."""
+    params = [one for one in command.get_params(context) if "--help" not in one.opts]
+    options = [one for one in params if isinstance(one, click.Option)]
+    groups: list[tuple[str, list[Any]]] = list(grouped(options, full=True))
+    if [title for title, _ in groups] == [OTHERS]:
+        groups = [("", groups[0][1])]
+    listed = {one.name for _, some in groups for one in some}
+    groups.insert(0, ("", [one for one in params if one.name not in listed]))
+    return groups
 
 
 def option_row(usage: str, text: str) -> tuple[str, str, str, str]:
@@ -102,7 +114,8 @@ def option_row(usage: str, text: str) -> tuple[str, str, str, str]:
     shown = ", ".join(map(code, choices[1].split("|"))) if choices else code(value)
     in_brackets = re.compile(r"\s*\[((?:default: |required|\S*x[<>]=?|\S*<=?x)[^\[\]]*)\]")
     default = ""
-    for note in in_brackets.findall(text):
+    notes = "; ".join(in_brackets.findall(text))
+    for note in filter(None, notes.split("; ")):
         ends = re.fullmatch(r"(?:(\S+?)<=?)?x(?:[<>]=?(\S+))?", note)
         if ends and not ends[1]:
             shown += f", from {ends[2]}" if ">" in note else f", to {ends[2]}"
@@ -216,26 +229,6 @@ def cameras_page() -> str:
                       table(("parameter", "", "default", "values"), body)])  # fmt: skip
 
 
-def python_page() -> str:
-    """Make the page of the public names of `wavecomb`."""
-    parts = ["# Python\n", "Public names of the package, from docstrings.\n"]
-    for name in wavecomb.__all__:
-        thing = getattr(wavecomb, name)
-        if name == "__version__":
-            continue
-        parts.append(f"## wavecomb.{name}\n")
-        if inspect.isfunction(thing):
-            parts.append(f"```python\n{name}{signature(thing)}\n```\n")
-        parts.append(docstring(thing))
-        if inspect.isclass(thing) and thing.__module__ != "wavecomb._core":
-            for method, function in vars(thing).items():
-                if not method.startswith("_") and inspect.isfunction(function):
-                    parts.append(f"### {name}.{method}\n")
-                    parts.append(f"```python\n{method}{signature(function)}\n```\n")
-                    parts.append(docstring(function))
-    return "\n".join(parts)
-
-
 def public_headers() -> list[Path]:
     """Return the public headers, for programs that link with the core."""
     text = (ROOT / "tools" / "words" / "public_headers.txt").read_text(encoding="utf-8")
@@ -271,41 +264,3 @@ def cpp_page() -> str:
         pages, table(("header", "content"), body),
         "## Example\n", f"```cpp\n{example}```\n",
     ])  # fmt: skip
-
-
-def signature(function: Any) -> str:
-    """Format a signature as in Python source, with one line per argument if it is long."""
-    text = str(inspect.signature(function)).replace("'", "")
-    if len(text) < 70:
-        return text
-    inside, _, answer = text[1:].rpartition(")")
-    arguments = re.split(r", (?=[*\w]+(?:[:=]|, |$)|\*)", inside)
-    return "(\n" + "".join(f"    {one},\n" for one in arguments) + ")" + answer
-
-
-def docstring(thing: Any) -> str:
-    """Convert a docstring: Google's sections become headings and lists, examples become code."""
-    out: list[str] = []
-    text = (inspect.getdoc(thing) or "").replace("``", "`").replace("  # doctest: +SKIP", "")
-    is_code = False
-    for line in text.splitlines():
-        if line.startswith((">>>", "...")) or (is_code and line.strip()):
-            out += [] if is_code else ["", "```pycon"]
-            is_code = True
-        elif is_code:
-            out.append("```")
-            is_code = False
-        section = re.fullmatch(r"(Args|Attributes|Returns|Raises|Contract):", line)
-        item = re.fullmatch(r"    (\*{0,2}\w+): (.*)", line)
-        if section:
-            out += ["", f"**{section[1]}**", ""]
-        elif item and not is_code:
-            out.append(f"- `{item[1]}`: {escaped(item[2])}")
-        else:
-            out.append(line if is_code else escaped(line))
-    return "\n".join([*out, *["```"] * is_code, ""])
-
-
-def escaped(line: str) -> str:
-    """Escape angle brackets, so that they do not act as markup."""
-    return line.replace("<", "&lt;")

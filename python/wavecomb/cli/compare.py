@@ -49,7 +49,7 @@ _MAPS = ("absolute", "signed", "flip-ldr", "flip-hdr", "z")
     ),
     option("--variance-b FILE", "path", "Image with the variance of B's pixels, for the z-test."),
     option(
-        "--significance", click.FloatRange(0.0, 1.0, min_open=True, max_open=True),
+        "--significance P", click.FloatRange(0.0, 1.0, min_open=True, max_open=True),
         "Significance level of the z-test.", default=0.01, show_default=True,
     ),
     option("--heatmap FILE.png", "path", "Write a false-colour image of the differences."),
