@@ -43,7 +43,7 @@ CMAKE_INPUTS := CMakeLists.txt $(wildcard cmake/*) $(wildcard tests/cpp/CMakeLis
 NATIVE_INPUTS := $(shell find src bindings 2> /dev/null)
 CPP_FILES := $(shell find src bindings tests/cpp tests/naive benchmarks/micro examples cmake \( -name '*.cpp' -o -name '*.h' -o -name '*.inl' \) 2> /dev/null)
 
-.PHONY: help setup setup-test build build-test-tools build-all-lanes build-lanes-before wheels sdist release render docs test test-fast test-cpp test-cpp-long test-py test-py-fast run-py run-py-fast run-py-long test-long fuzz test-asan test-asan-all test-tsan test-wheel test-sdist test-clang test-arm64 setup-blender test-blender blender-extension bench lint format clean
+.PHONY: help setup setup-test build build-test-tools build-all-lanes build-lanes-before wheels sdist check-release release render docs test test-fast test-cpp test-cpp-long test-py test-py-fast run-py run-py-fast run-py-long test-long fuzz test-asan test-asan-all test-tsan test-wheel test-sdist test-clang test-arm64 setup-blender test-blender blender-extension bench lint format clean
 
 help: ## Print this list
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -107,8 +107,12 @@ sdist: build/.setup ## Build the source distribution in dist/
 	@$(VENV)/python -c 'from scikit_build_core.build import build_sdist; build_sdist("dist")' > /dev/null
 	@ls dist/wavecomb-*.tar.gz
 
+# Building and testing take half an hour, so a changelog without the version is reported first.
+check-release: build/.setup
+	@$(VENV)/python tools/release --source
+
 # make release prints the files to upload, but uploads nothing.
-release: test-wheel test-sdist ## Build and test wheels and source distribution, and print what to upload
+release: check-release test-wheel test-sdist ## Build and test wheels and source distribution, and print what to upload
 	@$(VENV)/python -c 'import twine' 2> /dev/null || $(VENV)/python -m pip install -q -c constraints.txt 'twine>=6'
 	@$(VENV)/python tools/release
 
@@ -212,7 +216,7 @@ test-wheel: wheels ## Install the wheel into a fresh environment and an empty ro
 	$(WHEEL)/venv/bin/python -m pytest -q -o faulthandler_timeout=3600 tests/python/test_isa.py tests/python/test_cli.py tests/packaging/test_wheel.py \
 	  tests/packaging/test_empty_root.py
 
-test-sdist: sdist build/.setup-test ## Build the source distribution in a separate folder, and render
+test-sdist: sdist build build/.setup-test ## Build the source distribution in a separate folder, and render
 	$(VENV)/python -m pytest -q -o faulthandler_timeout=3600 tests/packaging/test_sdist.py
 
 # The clang and ARM64 builds compile OpenSubdiv and GoogleTest from source, since the packages of

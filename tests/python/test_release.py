@@ -61,6 +61,28 @@ def test_changelog(release: ModuleType, text: str, message: str) -> None:
     assert bool(release.changelog_problems(text, "0.2.0")) == bool(message)
 
 
+def test_other_files_name_the_release(release: ModuleType, tmp_path: Path) -> None:
+    (tmp_path / "blender").mkdir()
+    (tmp_path / "CHANGELOG.md").write_text("# C\n\n## 0.2.0, 2026-11-30\n\n- A.\n")
+    (tmp_path / "CITATION.cff").write_text("version: 0.2.0\ndate-released: 2026-11-30\n")
+    (tmp_path / "blender" / "blender_manifest.toml").write_text('version = "0.2.0"\n')
+    assert release.version_problems(tmp_path, "0.2.0") == []
+    (tmp_path / "CITATION.cff").write_text("version: 0.1.0\ndate-released: 2026-11-01\n")
+    assert release.version_problems(tmp_path, "0.2.0") == [
+        "CITATION.cff: no line is version: 0.2.0",
+        "CITATION.cff: no line is date-released: 2026-11-30",
+    ]
+
+
+def test_the_source_is_checked_without_files() -> None:
+    """`make release` reports a changelog without the version before it builds wheels."""
+    command = [sys.executable, str(ROOT / "tools" / "release"), "--source"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert "make wheels" not in done.stderr and done.returncode == bool(done.stderr)
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    assert "release: check-release test-wheel test-sdist" in makefile
+
+
 def test_an_empty_folder_is_refused(tmp_path: Path) -> None:
     command = [sys.executable, str(ROOT / "tools" / "release"), str(tmp_path)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
