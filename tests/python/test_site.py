@@ -155,8 +155,6 @@ SMALL = frozenset(
         "head",
         "heavy",
         "landscape",
-        "lens",
-        "prism",
         "splats",
         "spread",
     ]
