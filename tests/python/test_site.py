@@ -154,9 +154,7 @@ SMALL = frozenset(
         "fog",
         "head",
         "heavy",
-        "landscape",
         "splats",
-        "spread",
     ]
 )
 """Images of the gallery that still have to be rendered at a width of 1280 pixels."""
