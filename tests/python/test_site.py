@@ -153,7 +153,6 @@ SMALL = frozenset(
         "drinks",
         "fog",
         "head",
-        "heavy",
         "splats",
     ]
 )
