@@ -42,7 +42,7 @@ def examine() -> dict[str, list[Check]]:
     Broken libraries are reported in the results and never raise exceptions.
     """
     return {
-        "Wavecomb": [_package(), _try("native library", _native), _try("a picture", _picture)],
+        "Wavecomb": [_package(), _try("native library", _native), _try("test image", _picture)],
         "Libraries": [
             _library("OpenUSD", "usd-core", _usd_version),
             _library("OpenImageIO", "openimageio", _oiio_version),
@@ -143,7 +143,7 @@ def _picture() -> str:
     mean = float(result.beauty.mean())
     if not abs(mean - 0.5) < 0.05:
         raise WavecombError(f"a white sky over a grey wall rendered as {mean:.3g}, not 0.5")
-    return f"renders as it must, {1000 * (time.perf_counter() - start):.0f} ms"
+    return f"rendered correctly in {1000 * (time.perf_counter() - start):.0f} ms"
 
 
 def _library(name: str, package: str, look: Callable[[], str], *, needed: bool = True) -> Check:
@@ -199,7 +199,7 @@ def _embree_version() -> str:
     embree.rtcReleaseDevice.argtypes = [ctypes.c_void_p]
     device = embree.rtcNewDevice(b"threads=1")
     if not device:
-        raise WavecombError("Embree makes no device")
+        raise WavecombError("Embree cannot create a device")
     version = embree.rtcGetDeviceProperty(device, 0)  # property 0 is RTC_DEVICE_PROPERTY_VERSION
     embree.rtcReleaseDevice(device)
     return f"{version // 10000}.{version // 100 % 100}.{version % 100}"
@@ -269,7 +269,8 @@ def _machine() -> list[Check]:
         info = machine_info()
     except Exception as error:
         return [Check("machine", BROKEN, _why(error), False, _rebuild())]
-    rows = [(name, text) for name, text in machine_rows(info) if name != "native"]
+    listed_above = ("native", "openvdb", "nanovdb")
+    rows = [(name, text) for name, text in machine_rows(info) if name not in listed_above]
     why_not = info["sandbox"]["obstacle"]
     return [
         Check(name, MISSING if name == "sandbox" and why_not else OK, text, False)

@@ -90,9 +90,9 @@ def machine_rows(info: dict[str, Any]) -> list[tuple[str, str]]:
     has, may = (memory or 0) / 1e9, (limit or 0) / 1e9
     return [
         ("cores", str(info["cores"])),
-        ("memory", f"{has:.1f} GB; a child may take {may:.1f} GB"),
+        ("memory", f"{has:.1f} GB; limit of a child process {may:.1f} GB"),
         ("native", library_text()),
-        ("texture limit", info["texture_store"]["obstacle"] or "by a store"),
+        ("texture limit", info["texture_store"]["obstacle"] or "supported by this system"),
         ("openvdb", info["openvdb"] or "none: volumes are left out"),
         ("nanovdb", str(info["nanovdb"] or "none: .nvdb files are not read")),
         ("sandbox", info["sandbox"]["obstacle"] or "bubblewrap"),

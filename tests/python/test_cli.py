@@ -320,11 +320,11 @@ def test_summary_of_scheduling(fake: Fake, stage: str, tmp_path: Path) -> None:
         *("--stats", tmp_path / "a.json", "--verbose"),
     )
     for text in (
-        "policy adaptive: sorting 10 % of shading with it, lanes 80 % full",
-        "runs of a material 12.3 records",
+        "policy adaptive: sorting takes 10 % of the time of sorting and shading; 80 % of lanes",
+        "records: 12.3 in a row have the same material",
         "queues by policy: program 75 %, none 25 %",
-        "R2 0.93, mean error 5 %, over 9 materials",
-        "rays of a path 2.5; by depth: 1 0.8 0.4 0.2 0.05 0.02 0.01 0.01 ...",
+        "predicted costs of 9 materials: R2 0.93, mean error 5 %",
+        "rays per path: 2.5; at each depth: 1 0.8 0.4 0.2 0.05 0.02 0.01 0.01 ...",
         "and 3 more materials",
     ):
         assert text in result.stdout

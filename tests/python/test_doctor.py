@@ -37,7 +37,7 @@ def test_a_machine_that_is_well() -> None:
     found = doctor.examine()
     by_name = {one.name: one for group in found.values() for one in group}
     assert doctor.is_fit(found)
-    assert "renders as it must" in by_name["a picture"].text
+    assert "rendered correctly" in by_name["test image"].text
     assert by_name["Embree"].text.startswith("4.")
     assert by_name["OpenUSD"].text[:1].isdigit()
     assert "lanes" in by_name["native library"].text
@@ -65,7 +65,7 @@ def test_what_is_missing_comes_with_its_command(monkeypatch: pytest.MonkeyPatch)
     assert "missing" in after("OpenUSD")[0] and "pip install usd-core" in after("OpenUSD")[1]
     assert "missing" in after("[denoise]")[0]
     assert "pip install 'pyoidn>=2.5'" in after("[denoise]")[1]
-    assert "BROKEN" in after("a picture")[0] and "make build" in after("a picture")[1]
+    assert "BROKEN" in after("test image")[0] and "make build" in after("test image")[1]
     assert "set DISPLAY" in after("display")[1]
     plain = json.loads(run("--json").stdout)
     assert plain["fit"] is False and plain["schema"] == "wavecomb-doctor/1"

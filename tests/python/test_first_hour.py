@@ -282,7 +282,7 @@ def test_a_stage_in_memory_with_unsaved_edits(tmp_path: Path) -> None:
     target = stage.GetEditTarget()
     loaded = wavecomb.load(stage)
     text = repr(loaded)
-    assert "\n" not in text and len(text) < 160 and "30 triangles" in text
+    assert "\n" not in text and len(text) < 160 and "30 triangles, 4 materials, 1 light," in text
     before = wavecomb.render(stage, size=(32, 24), spp=4)
     again = wavecomb.render(loaded, size=(32, 24), spp=4)
     assert wavecomb.compare(before, again).equal

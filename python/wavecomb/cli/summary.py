@@ -166,7 +166,7 @@ def _why_not_guided(stats: Mapping[str, Any]) -> str:
     transport = stats.get("transport") or {}
     given = stats["settings"].get("transport")
     if transport.get("chosen") == "light" or given in ("light", "bdpt"):
-        return "guiding does not go with light paths"
+        return "guiding cannot be combined with light paths"
     return "too few samples to predict the gain"
 
 
@@ -216,27 +216,27 @@ def _scheduling_lines(stats: Mapping[str, Any]) -> list[str]:
     if counts.get("packet_lanes"):
         policy = stats["settings"].get("policy", "")
         lines.append(
-            f"policy {policy}: sorting {_percent(stats['sort_overhead'])} of shading with it, "
-            f"lanes {_percent(stats['lane_utilisation'])} full"
+            f"policy {policy}: sorting takes {_percent(stats['sort_overhead'])} of the time of "
+            f"sorting and shading; {_percent(stats['lane_utilisation'])} of lanes are used"
         )
         if counts.get("volume_lanes"):
             ways = counts["rays"] + counts["shadow_rays"]
             steps = counts["volume_steps"]
             lines.append(
                 f"volumes: {steps / ways:.3g} steps per ray, "
-                f"{_percent(counts['volume_collisions'] / steps)} of them collisions, "
-                f"lanes {_percent(steps / counts['volume_lanes'])} full"
+                f"{_percent(counts['volume_collisions'] / steps)} of them collisions; "
+                f"{_percent(steps / counts['volume_lanes'])} of lanes are used"
             )
         if counts.get("walks"):
             steps = counts["walk_steps"]
             lines.append(
-                f"subsurface: {steps / counts['walks']:.3g} collisions per random walk, "
-                f"lanes {_percent(steps / counts['walk_lanes'])} full"
+                f"subsurface: {steps / counts['walks']:.3g} collisions per random walk; "
+                f"{_percent(steps / counts['walk_lanes'])} of lanes are used"
             )
         lines.append(
-            f"runs of a material {coherence['run_length']:.3g} records; neighbours of one material "
-            f"{_percent(coherence['material_homogeneity'])}, at one place of a texture "
-            f"{_percent(coherence['texture_homogeneity'])}"
+            f"records: {coherence['run_length']:.3g} in a row have the same material; "
+            f"{_percent(coherence['material_homogeneity'])} of adjacent records have the same "
+            f"material, {_percent(coherence['texture_homogeneity'])} the same texture position"
         )
     uses = stats["policy_uses"]
     if total := sum(uses.values()):
@@ -247,14 +247,15 @@ def _scheduling_lines(stats: Mapping[str, Any]) -> list[str]:
         )
     if costs["materials"]:
         lines.append(
-            f"costs: predicted with R2 {costs['r2']:.2f}, mean error "
-            f"{_percent(costs['mean_error'])}, over {costs['materials']} materials"
+            f"predicted costs of {costs['materials']} materials: R2 {costs['r2']:.2f}, mean error "
+            f"{_percent(costs['mean_error'])}"
         )
     if by_depth := stats["depths"].get("rays"):
         shares = [f"{rays / max(1, by_depth[0]):.2g}" for rays in by_depth[:MOST_DEPTHS]]
         more = " ..." if len(by_depth) > MOST_DEPTHS else ""
         lines.append(
-            f"rays of a path {stats['mean_path_length']:.3g}; by depth: {' '.join(shares)}{more}"
+            f"rays per path: {stats['mean_path_length']:.3g}; at each depth: "
+            f"{' '.join(shares)}{more}"
         )
     return lines
 

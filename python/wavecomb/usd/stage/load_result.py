@@ -76,11 +76,11 @@ class LoadedStage:
     def __repr__(self) -> str:
         scene = self.scene
         counts = (
-            (scene.instanced_triangles, "triangles"),
-            (len(scene.materials), "materials"),
-            (scene.light_count, "lights"),
+            (scene.instanced_triangles, "triangle"),
+            (len(scene.materials), "material"),
+            (scene.light_count, "light"),
         )
-        said = ", ".join(f"{count:,} {name}" for count, name in counts)
+        said = ", ".join(f"{count:,} {name}{'s' * (count != 1)}" for count, name in counts)
         camera = self.camera_path or "none"
         return f"<wavecomb.LoadedStage {self.stage_path}: {said}, camera {camera}>"
 
