@@ -152,7 +152,6 @@ SMALL = frozenset(
         "around",
         "drinks",
         "fog",
-        "head",
         "splats",
     ]
 )
