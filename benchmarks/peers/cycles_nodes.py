@@ -203,17 +203,57 @@ def _dielectric(nodes: Nodes, m: dict[str, Any]) -> Any:
 
 def _principled(nodes: Nodes, m: dict[str, Any]) -> Any:
     """Convert `principled` or `plastic`, which is a diffuse base under a dielectric interface."""
+    ior = float(m.get("ior", 1.5))
     node = nodes.add(
         "ShaderNodeBsdfPrincipled",
         Base_Color=nodes.parameter(m, "base_color", (0.18,) * 3),
         Roughness=_roughness(nodes, m),
         Metallic=nodes.parameter(m, "metallic", 0.0),
-        IOR=float(m.get("ior", 1.5)),
+        IOR=ior,
         Coat_Weight=nodes.parameter(m, "clearcoat", 0.0),
         Coat_Roughness=nodes.parameter(m, "clearcoat_roughness", 0.01),
+        Coat_IOR=ior,
         **_normal(nodes, m),
     )
     node.distribution = "MULTI_GGX"
+    opacity = nodes.parameter(m, "opacity", 1.0)
+    if isinstance(opacity, float) and opacity >= 1.0:
+        return node.outputs[0]
+    clear = nodes.add("ShaderNodeBsdfTransparent", Color=(1.0,) * 3).outputs[0]
+    if not m.get("presence"):
+        clear = _clear_interface(nodes, m, ior, clear)
+    return _mix(nodes, opacity, clear, node.outputs[0])
+
+
+def _clear_interface(nodes: Nodes, m: dict[str, Any], ior: float, clear: Any) -> Any:
+    """Add the reflection of a UsdPreviewSurface of opacity 0 to its straight transmission."""
+    if float(m.get("metallic", 0.0)) or float(m.get("clearcoat", 0.0)):
+        raise NotImplementedError("a metal or a coat that transmits light")
+    reflects = nodes.add(
+        "ShaderNodeBsdfAnisotropic",
+        Color=(1.0,) * 3,
+        Roughness=_roughness(nodes, m),
+        **_normal(nodes, m),
+    )
+    reflects.distribution = "MULTI_GGX"
+    # The node inverts the index at back faces, where UsdPreviewSurface reflects as at front faces.
+    back = nodes.add("ShaderNodeNewGeometry").outputs["Backfacing"]
+    index = nodes.tree.nodes.new("ShaderNodeMath")
+    index.operation = "MULTIPLY_ADD"
+    nodes.tree.links.new(back, index.inputs[0])
+    index.inputs[1].default_value, index.inputs[2].default_value = 1.0 / ior - ior, ior
+    fresnel = nodes.add("ShaderNodeFresnel", IOR=index.outputs[0], **_normal(nodes, m))
+    return _mix(nodes, fresnel.outputs[0], clear, reflects.outputs[0])
+
+
+def _mix(nodes: Nodes, share: Any, first: Any, second: Any) -> Any:
+    """Mix two closures; `share` is that of the second."""
+    node = nodes.tree.nodes.new("ShaderNodeMixShader")
+    for socket, value in zip(node.inputs, (share, first, second), strict=True):
+        if isinstance(value, bpy.types.NodeSocket):
+            nodes.tree.links.new(value, socket)
+        else:
+            socket.default_value = value
     return node.outputs[0]
 
 

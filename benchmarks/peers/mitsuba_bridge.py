@@ -3,10 +3,11 @@
 
 Exact equivalents: geometry; rect, disk, sphere and dome lights; closed emissive meshes (Wavecomb's
 emit to both sides, Mitsuba's outwards); diffuse, smooth metal with measured index, smooth
-dielectric; the camera with a box filter. GGX agrees within noise where multiple scattering between
-microfacets, which Mitsuba ignores, is small. Approximations: metal defined by colours (Mitsuba has
-no Schlick reflectance), plastic, principled, and OpenPBR except for its glass and its metal without
-a tint. A distant light with an angle becomes a distant sphere.
+dielectric, UsdPreviewSurface with constant opacity below 1 (mitsuba_preview.py); the camera with a
+box filter. GGX agrees within noise where multiple scattering between microfacets, which Mitsuba
+ignores, is small. Approximations: metal defined by colours (Mitsuba has no Schlick reflectance),
+plastic, principled, and OpenPBR except for its glass and its metal without a tint. A distant light
+with an angle becomes a distant sphere.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from typing import Any
 
 import numpy as np
 from mitsuba_media import Media
+from mitsuba_preview import preview_surface
 from numpy.typing import NDArray
 from recorded import INHERIT, Mesh, Placed, Recorded
 
@@ -95,6 +97,8 @@ class PeerSettings:
         instancing: Use shape groups where Mitsuba supports them; otherwise copy all instances.
         sampler: Name of a Mitsuba sampler.
         integrator: Name of the integrator for scenes with volumes, or ptracer to trace light paths.
+        same_preview: Render all UsdPreviewSurfaces by Wavecomb's formulas (mitsuba_preview.py),
+            instead of only those with opacity below 1.
     """
 
     width: int
@@ -104,6 +108,7 @@ class PeerSettings:
     instancing: bool = False
     sampler: str = "independent"
     integrator: str = "volpathmis"
+    same_preview: bool = False
 
 
 class MitsubaScene:
@@ -381,10 +386,11 @@ class MitsubaScene:
 
     def _bsdf(self, number: int) -> Any:
         if number not in self._bsdfs:
-            self._bsdfs[number] = self.mi.load_dict(self._material(number))
+            made = self._material(number)
+            self._bsdfs[number] = self.mi.load_dict(made) if isinstance(made, dict) else made
         return self._bsdfs[number]
 
-    def _material(self, number: int) -> dict[str, Any]:
+    def _material(self, number: int) -> Any:
         if number == INHERIT:
             return {"type": "twosided", "bsdf": {"type": "diffuse"}}
         m = self.recorded.materials[number]
@@ -404,14 +410,17 @@ class MitsubaScene:
             "openpbr": self._principled,
         }
         if program == "emissive":
-            inner: dict[str, Any] = {"type": "diffuse", "reflectance": self._rgb(np.zeros(3))}
+            inner: Any = {"type": "diffuse", "reflectance": self._rgb(np.zeros(3))}
+        elif program == "principled" and (self.settings.same_preview or see_through(m)):
+            inner = self._preview(m)
         else:
             inner = makers[program](m)
         if m.get("textures", {}).get("normal"):
             use = m["textures"]["normal"]
             image = 0.5 + 0.5 * self._values(use)
             inner = {"type": "normalmap", "normalmap": self._bitmap(use, image), "bsdf": inner}
-        return {"type": "twosided", "bsdf": inner}
+        # Mitsuba's twosided refuses surfaces that transmit light.
+        return inner if see_through(m) else {"type": "twosided", "bsdf": inner}
 
     def _diffuse(self, m: dict[str, Any]) -> dict[str, Any]:
         return {"type": "diffuse", "reflectance": self._colour(m, "base_color", (0.18,) * 3)}
@@ -460,15 +469,36 @@ class MitsubaScene:
         return self._rough(out, m)
 
     def _principled(self, m: dict[str, Any]) -> dict[str, Any]:
+        coat_alpha = float(m.get("clearcoat_roughness", 0.01)) ** 2
         return {
             "type": "principled",
             "base_color": self._colour(m, "base_color", (0.18,) * 3),
             "roughness": self._number(m, "roughness", 0.5),
             "metallic": self._number(m, "metallic", 0.0),
             "eta": max(float(m.get("ior", 1.5)), 1.01),
-            "clearcoat": self._number(m, "clearcoat", 0.0),
-            "clearcoat_gloss": 1.0 - float(m.get("clearcoat_roughness", 0.01)),
+            # Mitsuba divides clearcoat by 4, and its alpha is 0.1 - 0.099 gloss.
+            "clearcoat": 4.0 * float(m.get("clearcoat", 0.0)),
+            "clearcoat_gloss": float(np.clip((0.1 - coat_alpha) / 0.099, 0.0, 1.0)),
         }
+
+    def _preview(self, m: dict[str, Any]) -> Any:
+        """Return UsdPreviewSurface by Wavecomb's formulas."""
+        if self.mi.variant().startswith("scalar"):
+            raise NotImplementedError("UsdPreviewSurface with opacity in a scalar variant")
+
+        def made(value: Any) -> Any:
+            return self.mi.load_dict(value) if isinstance(value, dict) else value
+
+        inputs = {
+            "base_color": made(self._colour(m, "base_color", (0.18,) * 3)),
+            "roughness": self._number(m, "roughness", 0.5),
+            "metallic": self._number(m, "metallic", 0.0),
+            "ior": float(m.get("ior", 1.5)),
+            "clearcoat": float(m.get("clearcoat", 0.0)),
+            "clearcoat_roughness": float(m.get("clearcoat_roughness", 0.01)),
+            "opacity": float(m.get("opacity", 1.0)),
+        }
+        return preview_surface(self.mi)(inputs)
 
     # ---- textures --------------------------------------------------------------------------------
 
@@ -516,6 +546,21 @@ class MitsubaScene:
                 }
             )
         return self._textures[key]
+
+
+def see_through(m: dict[str, Any]) -> bool:
+    """Whether a UsdPreviewSurface transmits light without refraction.
+
+    Raises:
+        NotImplementedError: The opacity has a texture or cuts out the surface.
+    """
+    if m["program"] != "principled":
+        return False
+    is_textured = m.get("textures", {}).get("opacity") is not None
+    is_below_one = float(m.get("opacity", 1.0)) < 1.0
+    if is_textured or (is_below_one and m.get("presence")):
+        raise NotImplementedError("opacity by a texture or as presence")
+    return is_below_one
 
 
 def _linear(texture: dict[str, Any]) -> NDArray[np.float32]:

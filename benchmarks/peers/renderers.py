@@ -51,6 +51,11 @@ RENDERERS = {
         {"variant": "llvm_ad_rgb", "sampler": "multijitter", "integrator": "volpath"},
         warm=True,
     ),
+    "mitsuba-llvm-same": Renderer(
+        "mitsuba",
+        {"variant": "llvm_ad_rgb", "sampler": "multijitter", "same_preview": True},
+        warm=True,
+    ),
     "mitsuba-llvm-ptracer": Renderer(
         "mitsuba", {"variant": "llvm_ad_rgb", "integrator": "ptracer"}, warm=True
     ),
@@ -60,9 +65,14 @@ RENDERERS = {
         "cycles", {"light_tree": True, "shadow_caustics": True}, (9, 36)
     ),
 }
-_APART = ("mitsuba-llvm-volpath", "mitsuba-llvm-ptracer", "cycles-shadow-caustics")
+_APART = (
+    "mitsuba-llvm-volpath",
+    "mitsuba-llvm-same",
+    "mitsuba-llvm-ptracer",
+    "cycles-shadow-caustics",
+)
 USUAL = tuple(name for name in RENDERERS if name not in _APART)
-"""All renderers except those that are compared only on volumes or caustics."""
+"""All renderers except those that are compared only on volumes, brightness or caustics."""
 
 
 @dataclass(frozen=True)

@@ -62,7 +62,7 @@ def open_wavecomb(args: argparse.Namespace, options: dict[str, Any]) -> Opened:
 
 
 def open_mitsuba(args: argparse.Namespace, options: dict[str, Any]) -> Opened:
-    """Load the recorded arrays. Options: variant, sampler."""
+    """Load the recorded arrays. Options: variant, and fields of PeerSettings."""
     from mitsuba_bridge import MitsubaScene, PeerSettings, load_mitsuba
 
     variant = options.pop("variant")
