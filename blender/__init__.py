@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from . import engine, panels, settings
+from . import engine, panels, settings, standby
 
 CLASSES = (
     settings.WavecombSettings,
@@ -13,7 +13,10 @@ CLASSES = (
     engine.WavecombRenderEngine,
     *panels.CLASSES,
 )
-_HANDLERS = ("render_complete", "render_cancel", "load_pre")
+_HANDLERS = (
+    *((name, engine.close_sessions) for name in ("render_complete", "render_cancel", "load_pre")),
+    *standby.HANDLERS.items(),
+)
 
 
 def register() -> None:
@@ -21,19 +24,22 @@ def register() -> None:
     for one in CLASSES:
         bpy.utils.register_class(one)
     bpy.types.Scene.wavecomb = bpy.props.PointerProperty(type=settings.WavecombSettings)
-    for name in _HANDLERS:
-        getattr(bpy.app.handlers, name).append(engine.close_sessions)
+    for name, function in _HANDLERS:
+        handlers = getattr(bpy.app.handlers, name)
+        if function not in handlers:
+            handlers.append(function)
     panels.show_common()
 
 
 def unregister() -> None:
     """Removes everything that ``register`` added."""
     panels.hide_common()
-    for name in _HANDLERS:
+    for name, function in _HANDLERS:
         handlers = getattr(bpy.app.handlers, name)
-        if engine.close_sessions in handlers:
-            handlers.remove(engine.close_sessions)
+        if function in handlers:
+            handlers.remove(function)
     engine.close_sessions()
+    standby.stop()
     del bpy.types.Scene.wavecomb
     for one in reversed(CLASSES):
         bpy.utils.unregister_class(one)

@@ -13,7 +13,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from . import cryptomatte, exr, settings
+from . import cryptomatte, exr, settings, standby
 from .camera import NoCamera
 from .export import Exported, ExportError, Session, export_stage
 from .motion import sample, shutter_of
@@ -26,6 +26,7 @@ FAILURES = (ExportError, NoCamera, WavecombError, exr.ExrError, OSError)
 _sessions: dict[tuple[str, str], Session] = {}
 
 
+@bpy.app.handlers.persistent  # type: ignore[untyped-decorator]
 def close_sessions(*_: Any) -> None:
     """Removes the files of all renders."""
     chosen = settings.preferences()
@@ -65,11 +66,13 @@ class WavecombRenderEngine(bpy.types.RenderEngine):
 
     def _render(self, depsgraph: Any) -> None:
         scene, layer = depsgraph.scene, depsgraph.view_layer_eval
-        render = Render(settings.program())
-        try:
-            self._render_by(render, depsgraph, scene, layer)
-        finally:
-            render.kill()
+        program = settings.program()
+        with standby.rendering(bool(getattr(self, "is_animation", False))):
+            render = standby.take(program) or Render(program)
+            try:
+                self._render_by(render, depsgraph, scene, layer)
+            finally:
+                render.kill()
 
     def _render_by(self, render: Render, depsgraph: Any, scene: Any, layer: Any) -> None:
         """Exports the scene and renders it by a process that waits for it."""

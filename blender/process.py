@@ -27,16 +27,26 @@ line = sys.stdin.readline()
 if not line:
     sys.exit(0)
 os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+parent, *words = json.loads(line)
+from wavecomb.boot import end_with_parent
+end_with_parent(parent)
 from wavecomb.cli import main
-sys.argv[:] = ["wavecomb", *json.loads(line)]
+sys.argv[:] = ["wavecomb", *words]
 main(prog_name="wavecomb")
 """
-"""Program that loads modules, then waits for a line with the arguments."""
+"""Program that loads modules, then waits for a line with Blender's process and the arguments.
+
+The program ends if the line does not come because Blender has ended. Linux ends a process together
+with the thread that started it, and Blender renders in threads. Therefore the program asks to end
+with Blender only when the render begins.
+"""
 _MODULES = (
-    "wavecomb.cli.render", "wavecomb.cli.job", "wavecomb.usd.stage", "wavecomb.run.callbacks",
-    "wavecomb.image.files.exr", "pxr.Usd", "pxr.UsdGeom", "pxr.UsdShade", "pxr.UsdLux",
-    "pxr.UsdRender", "pxr.UsdSkel", "pxr.UsdVol",
+    "wavecomb.cli.render", "wavecomb.cli.frames", "wavecomb.cli.planning", "wavecomb.cli.job",
+    "wavecomb.usd.stage.load", "wavecomb.run.callbacks", "wavecomb.run.cost_profile",
+    "wavecomb.image.files.exr", "wavecomb.image.files.deep", "wavecomb._core", "OpenImageIO",
+    "pxr.UsdRender", "pxr.UsdSkel", "pxr.UsdUI", "pxr.UsdUtils", "pxr.UsdVol",
 )  # fmt: skip
+"""Modules that every render needs."""
 _FOUND: dict[str, tuple[str, str]] = {}
 
 
@@ -96,7 +106,7 @@ def environment() -> dict[str, str]:
 
 
 class Render:
-    """A process that loads Wavecomb while the scene is exported, and then renders."""
+    """A process that loads Wavecomb, waits for the scene, and then renders it."""
 
     def __init__(self, program: str) -> None:
         """Starts the process, which ends when this process ends.
@@ -105,7 +115,7 @@ class Render:
             WavecombError: The render could not be started.
         """
         python, boot = locate(program)
-        words = [python, "-I", boot, f"--parent={os.getpid()}", "-c", _WAIT, *_MODULES]
+        words = [python, "-I", boot, "-c", _WAIT, *_MODULES]
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115
         try:
             self._process = subprocess.Popen(
@@ -127,10 +137,10 @@ class Render:
 
         The process is already separate from Blender, so that it needs no child of its own.
         """
-        words = ["render", *arguments, "--progress", "json", "--isolate", "off"]
+        request = [os.getpid(), "render", *arguments, "--progress", "json", "--isolate", "off"]
         assert self._process.stdin is not None
         with contextlib.suppress(BrokenPipeError), self._process.stdin as stream:
-            stream.write(json.dumps(words).encode() + b"\n")
+            stream.write(json.dumps(request).encode() + b"\n")
 
     def _read(self) -> None:
         assert self._process.stdout is not None

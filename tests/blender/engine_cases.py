@@ -108,6 +108,48 @@ def errors(folder: Path) -> None:
     emit(alive=_message(scene) == "")
 
 
+def standby(folder: Path) -> None:
+    """Renders with processes that wait; ends one, changes the engine, and kills Blender."""
+    import bpy
+
+    scene, _ = _ball()
+    waiting = sys.modules["wavecomb_blender.standby"]
+
+    def process() -> int:
+        bpy.context.view_layer.update()
+        if waiting._started is None:
+            return 0
+        waiting._started.join()
+        return int(waiting._started._render._process.pid)
+
+    cold, _ = harness.render(scene, "WAVECOMB", 1)
+    emit(in_background=process())
+    waiting.is_wanted = lambda: True
+    used: list[int] = []
+    render_by = _engine().WavecombRenderEngine._render_by
+
+    def record(self: Any, render: Any, *words: Any) -> None:
+        used.append(render._process.pid)
+        render_by(self, render, *words)
+
+    _engine().WavecombRenderEngine._render_by = record
+    scene.camera.update_tag()
+    first = process()
+    warm, _ = harness.render(scene, "WAVECOMB", 1)
+    second = process()
+    emit(first=first, second=second, same=bool(np.array_equal(cold, warm)))
+    os.kill(second, signal.SIGKILL)
+    time.sleep(0.5)
+    again, _ = harness.render(scene, "WAVECOMB", 1)
+    emit(used=used, after_kill=bool(np.array_equal(cold, again)))
+    third = process()
+    scene.render.engine = "CYCLES"
+    emit(third=third, other_engine=process(), ended=not Path(f"/proc/{third}").exists())
+    scene.render.engine = "WAVECOMB"
+    emit(last=process())
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
 def full(folder: Path) -> None:
     """Simulates a full disk by a limit on file sizes, for stage, correction layer and image."""
     import resource
@@ -169,6 +211,8 @@ def animation(folder: Path) -> None:
     bake = textures.run_blender
     textures.run_blender = lambda script, words: bakes.append(script) or bake(script, words)
     scene.render.engine = "WAVECOMB"
+    # Keep the baked texture of the first frame: a bake of the last frame differs slightly.
+    bpy.app.handlers.render_complete.remove(_engine().close_sessions)
     bpy.ops.render.render(animation=True)
     emit(exports=count[0], bakes=len(bakes), frames=len(list(folder.glob("frame-*.exr"))))
     scene.frame_set(25)
@@ -316,6 +360,6 @@ def blend(folder: Path) -> None:
 if __name__ == "__main__":
     CASES = {
         one.__name__: one
-        for one in (same, errors, full, report, cryptomatte, passes, animation, blend)
+        for one in (same, errors, standby, full, report, cryptomatte, passes, animation, blend)
     }
     CASES[sys.argv[1]](Path(sys.argv[2]))

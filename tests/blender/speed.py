@@ -3,7 +3,8 @@
 
 Prints one JSON row per run. A row has the seconds and CPU seconds of Blender's exporter alone, of
 the exporter and the correction layer, and of the time from F12 to the first image (including
-Wavecomb's process). The environment variable WAVECOMB names the program to run.
+Wavecomb's process): with a process that has waited for the render, as in Blender's window, and
+without (``cold``). The environment variable WAVECOMB names the program to run.
 """
 
 from __future__ import annotations
@@ -61,29 +62,49 @@ def _cpu_of(process: int) -> float:
 def first_image(engine: Any) -> tuple[float, float]:
     """Returns seconds, and CPU seconds of both processes, from F12 to the first image."""
     found: list[tuple[float, float]] = []
-    running: list[Any] = []
-    kind, start_render, shows = engine.WavecombRenderEngine, engine.Render, engine.shows_progress
-    original = kind._show
-    start, cpu = time.perf_counter(), _cpu()
+    running: list[tuple[Any, float]] = []
+    kind, shows_progress = engine.WavecombRenderEngine, engine.shows_progress
+    show, render_by = kind._show, kind._render_by
 
-    class Recorded(start_render):  # type: ignore[misc,valid-type]
-        def __init__(self, *words: Any) -> None:
-            super().__init__(*words)
-            running.append(self)
+    def record(self: Any, render: Any, *words: Any) -> None:
+        running.append((render, _cpu_of(render._process.pid)))
+        render_by(self, render, *words)
 
-    def show(self: Any, *words: Any) -> None:
-        original(self, *words)
+    def show_first(self: Any, *words: Any) -> None:
+        show(self, *words)
         if not found:
-            total = _cpu() - cpu + _cpu_of(running[0]._process.pid)
-            found.append((time.perf_counter() - start, total))
-            running[0].stop()
+            render, before = running[0]
+            used = _cpu() - cpu + _cpu_of(render._process.pid) - before
+            found.append((time.perf_counter() - start, used))
+            render.stop()
 
-    kind._show, engine.shows_progress, engine.Render = show, lambda engine: True, Recorded
+    kind._render_by, kind._show, engine.shows_progress = record, show_first, lambda engine: True
+    start, cpu = time.perf_counter(), _cpu()
     try:
         bpy.ops.render.render()
     finally:
-        kind._show, engine.shows_progress, engine.Render = original, shows, start_render
+        kind._render_by, kind._show, engine.shows_progress = render_by, show, shows_progress
     return found[0]
+
+
+def prepare_standby(standby: Any) -> None:
+    """Starts the process that waits for a render, as Blender's window does; waits until it waits.
+
+    The wheel has no window, so that the extension would start no process by itself.
+    """
+    wanted = standby.is_wanted
+    standby.is_wanted = lambda: True
+    try:
+        bpy.context.view_layer.update()
+        standby.update()
+    finally:
+        standby.is_wanted = wanted
+    standby._started.join()
+    process = standby._started._render._process.pid
+    used = -1.0
+    while used != _cpu_of(process):
+        used = _cpu_of(process)
+        time.sleep(1.0)
 
 
 def run(scene: Any) -> dict[str, Any]:
@@ -99,9 +120,12 @@ def run(scene: Any) -> dict[str, Any]:
     finally:
         shutil.rmtree(folder)
     scene.wavecomb.spp = 1 << 16
+    cold = first_image(engine)
+    engine.close_sessions()
+    prepare_standby(sys.modules["wavecomb_blender.standby"])
     first = first_image(engine)
     engine.close_sessions()
-    rows = {"exporter": alone, "export": whole, "first_image": first}
+    rows = {"exporter": alone, "export": whole, "first_image": first, "first_image_cold": cold}
     found: dict[str, Any] = {f"{k}_s": round(v[0], 3) for k, v in rows.items()}
     found |= {f"{k}_cpu_s": round(v[1], 3) for k, v in rows.items()}
     found["export_ratio"] = round(whole[0] / alone[0], 3)

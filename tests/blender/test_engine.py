@@ -7,6 +7,7 @@ import json
 import os
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -38,6 +39,28 @@ def test_errors_are_one_line(blender: Run, tmp_path: Path) -> None:
     assert "has no camera" in str(row["camera"])
     assert "SIGKILL" in str(row["killed"])
     assert row["alive"] is True
+
+
+def test_a_process_waits_for_the_next_render(blender: Run, tmp_path: Path) -> None:
+    """A waiting process renders the same image, is replaced, and ends with engine or Blender."""
+    row = _rows(blender(str(HERE / "engine_cases.py"), "standby", str(tmp_path)))
+    assert row["in_background"] == 0
+    used = row["used"]
+    assert isinstance(used, list) and len(used) == 2
+    assert used[0] == row["first"] != 0
+    assert row["second"] not in (0, *used)
+    assert row["same"] is True
+    assert row["after_kill"] is True
+    assert row["third"] != 0
+    assert row["other_engine"] == 0
+    assert row["ended"] is True
+    last = Path("/proc", str(row["last"]))
+    assert row["last"] != 0
+    for _ in range(200):
+        if not last.exists():
+            return
+        time.sleep(0.1)
+    raise AssertionError(f"process {row['last']} outlives Blender")
 
 
 def test_full_disk_is_one_line(blender: Run, tmp_path: Path) -> None:
