@@ -51,7 +51,7 @@ def run(one: ParityScene, output: Path) -> dict[str, Any]:
     row["messages"] = list(dict.fromkeys(line.removeprefix("wavecomb: ") for line in messages))
     row["seconds"] = seconds
     row["group"], row["about"] = one.group, (one.make.__doc__ or "").strip()
-    row["expected"] = asdict(one.expected)
+    row["expected"], row["expected_messages"] = asdict(one.expected), one.messages
     row["blender"] = bpy.app.version_string
     both = [np.mean(images[engine], axis=0) for engine in ("CYCLES", "WAVECOMB")]
     scale = 0.7 / max(float(np.percentile(both[0][..., :3], 95)), 1e-3)

@@ -265,9 +265,7 @@ def combined_motion_lights() -> None:
     assert thing is not None
 
 
-@scene("Combined")
-def combined_mirrors() -> None:
-    """A mirror and a coated ball, which both reflect a visible light."""
+def _mirrors() -> None:
     studio(0.1)
     mirror = principled("mirror", metallic=1.0, roughness=0.0, base_color=(0.95, 0.95, 0.95))
     thing = cube(mirror, at=(0, 1.5, 1.2), size=2.4, turn=(0, 0, 0.1))
@@ -278,7 +276,22 @@ def combined_mirrors() -> None:
         radius=0.7,
     )
     light("POINT", 60.0, at=(3.5, -3.5, 2.5), shadow_soft_size=0.2)
+
+
+@scene("Combined")
+def combined_mirrors() -> None:
+    """A mirror and a coated ball, which both reflect a visible light."""
+    _mirrors()
     show_lights()
+
+
+HIDDEN = "mirrors do not show lights that the camera does not see, and cast no caustics of them"
+
+
+@scene("Combined", 0.87, 0.94, 0.45, HIDDEN, messages=("mirrors and clear glass do not show",))
+def combined_mirrors_hidden_light() -> None:
+    """The same mirrors with lights that the camera does not see."""
+    _mirrors()
 
 
 @scene("Combined")

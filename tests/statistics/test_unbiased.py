@@ -43,7 +43,7 @@ def mixed(generated: Any) -> Any:
 def test_same_mean(
     scene: str, name: str, settings: dict[str, Any], beauty: Any, request: Any, fewer: int
 ) -> None:
-    """The scene `mixed` has smooth metal and glass, textures, and a material of every shading program."""
+    """The scene `mixed` has smooth metal and glass, textures, and all shading programs."""
     stage = request.getfixturevalue(scene)
     plain: dict[str, Any] = {"max_depth": 8}
     if scene == "mixed":
