@@ -41,7 +41,7 @@ def exact_weight(c: Array, ior: float) -> Array:
 
 
 def visible_normals(z: float, alpha: float) -> tuple[Array, Array]:
-    """Return o.h and G2 / G1 of visible GGX normals for a view of cosine z (Heitz 2018)."""
+    """Return o.h and G2 / G1 of visible GGX normals for a view of cosine z (Heitz, see ggx.h)."""
     k = np.arange(_SAMPLES)
     u, v = (k + 0.5) / _SAMPLES, (k * 0.6180339887498949) % 1.0
     o = np.array((np.sqrt(max(1.0 - z * z, 0.0)), 0.0, z))

@@ -366,7 +366,7 @@ def test_preview_surface(
     }  # fmt: skip
     body = material("M", "principled", **looks[look])
     dome = light("Dome", texture=write_sky(tmp_path))
-    lamp = light("Disk", colour=(9, 6, 3), transform=look_at((-1.5, 3, 2.5), (0, 1, 0)), radius=0.6)
+    lamp = light("Disk", "Lamp", (9, 6, 3), look_at((-1.5, 3, 2.5), (0, 1, 0)), radius=0.6)
     ball = sphere("Ball", "M", (0, 1.01, 0), rings=16)
     scene = recorded(VIEW, dome, lamp, GREY, body, ground("Grey"), ball)
     if mitsuba.variant().startswith("scalar"):
