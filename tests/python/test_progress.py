@@ -185,6 +185,25 @@ def test_preview_grows(tmp_path: Path) -> None:
     assert (read_image(preview) == read_image(tmp_path / "a.png")).all(), "the last is the picture"
 
 
+def test_the_first_preview_shows_the_whole_image(tmp_path: Path) -> None:
+    """Renders with a preview begin with short passes, which do not change the image."""
+    pytest.importorskip("wavecomb._core")
+    from wavecomb.image.files.image import read_layers
+    from wavecomb.scenes import write_scene
+
+    write_scene("cornell", tmp_path / "a.usdc")
+    passes, images = [], []
+    for more in ([], ["--preview", tmp_path / "p.exr"]):
+        out, stats = tmp_path / "a.exr", tmp_path / "a.json"
+        words = ["-o", out, "--size", 16, 16, "--spp", 16, "--stats", stats, *more]
+        result = render(tmp_path / "a.usdc", *words)
+        assert result.exit_code == 0, result.output
+        passes.append(json.loads(stats.read_text())["passes"])
+        images.append(read_layers(out)["beauty"])
+    assert passes == [1, 5]
+    assert (images[0] == images[1]).all()
+
+
 def test_a_preview_may_be_linear(tmp_path: Path) -> None:
     pytest.importorskip("wavecomb._core")
     from wavecomb.image.files.image import read_layers

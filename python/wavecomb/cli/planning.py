@@ -71,6 +71,9 @@ def prepare(options: RenderOptions) -> Prepared:
     kept = chosen.pop("aovs", aov_names.for_core(aov_names.DEFAULT))
     if resumed is not None:
         _check_deep(options, kept)
+    if options.preview is not None:
+        # The first preview should show the whole image.
+        chosen["progressive"] = True
     _check_settings(chosen)
     choices, opened = _peek(options)
     named = options.image is not None

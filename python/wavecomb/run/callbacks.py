@@ -144,6 +144,9 @@ class Watcher:
             self._reporter.show(status)
         if self._is_stopped():
             return "stop"
+        if not status["samples_done"]:
+            # A pause before the first sample would delay the first preview.
+            return None
         return "snapshot" if any(sink.is_due() for sink in self._sinks) else None
 
     def snapshot(self, snapshot: Snapshot) -> None:
