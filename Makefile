@@ -99,7 +99,8 @@ wheels: build/.setup ## Build the distributable wheel in dist/, with every instr
 	  --config-settings=build-dir=$(WHEEL) --config-settings=cmake.define.WAVECOMB_ISAS="$(ISAS)" \
 	  --config-settings=cmake.define.WAVECOMB_BATCH=$(BATCH)
 	@LD_LIBRARY_PATH=.venv/lib $(VENV)/auditwheel repair --plat auto -w dist $(WHEEL)/raw/wavecomb-*.whl --exclude libtbb.so.12 --exclude libembree4.so.4 \
-	  $$($(VENV)/python -m zipfile -l $(WHEEL)/raw/wavecomb-*.whl | sed -n 's|^wavecomb/lib/\(lib[^ /]*\) .*|--exclude \1|p')
+	  $$($(VENV)/python -m zipfile -l $(WHEEL)/raw/wavecomb-*.whl | sed -n 's|^wavecomb/lib/\(lib[^ /]*\) .*|--exclude \1|p') \
+	  2> >(grep -v '^INFO:' >&2)
 	@ls dist/wavecomb-*.whl
 
 sdist: build/.setup ## Build the source distribution in dist/
