@@ -80,6 +80,20 @@ def write_balls(path: Path, light: str) -> None:
     writer.save("Balls of the materials of the generated stages")
 
 
+def without_opacity(stage: Path) -> Path:
+    """Write a copy of a stage whose materials are opaque."""
+    from pxr import Usd, UsdShade
+
+    opened = Usd.Stage.Open(str(stage))
+    for prim in opened.Traverse():
+        given = UsdShade.Shader(prim).GetInput("opacity") if prim.IsA(UsdShade.Shader) else None
+        if given:
+            given.Set(1.0)
+    path = stage.with_name(f"{stage.stem}-opaque.usdc")
+    opened.GetRootLayer().Export(str(path))
+    return path
+
+
 def prepare(name: str, args: argparse.Namespace) -> Job:
     """Write a stage and its arrays."""
     from recording import record
@@ -91,6 +105,8 @@ def prepare(name: str, args: argparse.Namespace) -> Job:
         write_balls(stage, name)
     elif name == "mixed-lamps" and not stage.exists():
         write_scene("mixed", stage, plain=True, lamps=True)
+    if args.opaque:
+        stage = without_opacity(stage)
     scene = record(stage)
     recorded = args.cache / f"{stage.stem}-recorded"
     scene.save(recorded)
@@ -177,6 +193,7 @@ def main() -> None:
     add("--more", type=int, default=2, help="factor of Wavecomb's samples")
     add("--seeds", type=int, default=5)
     add("--max-depth", type=int, default=7, help="scattering vertices")
+    add("--opaque", action="store_true", help="render all materials opaque")
     add("--threads", type=int, default=2)
     add("--cache", type=Path, default=ROOT / "out" / "brightness", help="folder of stages and logs")
     add("--output", type=Path, default=ROOT / "benchmarks" / "results" / "brightness.json")
