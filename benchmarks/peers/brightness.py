@@ -126,7 +126,10 @@ def mattes(job: Job) -> dict[str, Array]:
     )  # fmt: skip
     ranks = picture.aovs["crypto_material"]
     found = picture.manifests["crypto_material"]
-    return {k.split("/")[-1]: cryptomatte.matte(ranks, v) for k, v in found.items()}
+    return {
+        k.split("/")[-1]: np.asarray(cryptomatte.matte(ranks, v), np.float64)
+        for k, v in found.items()
+    }
 
 
 def images(name: str, job: Job, args: argparse.Namespace) -> list[Array]:
