@@ -20,19 +20,25 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "blender-parity.md"
 HEAD = """# Blender: comparison with Cycles
 
-Scenes made by script, rendered by Cycles and by the [Blender extension](blender.md) with the same
-number of bounces, a box filter and no clamping. Blender {version}{samples}.
+A script makes scenes and renders them with Cycles and with the [Blender extension](blender.md),
+with the same number of bounces, a box filter and no clamping. The images of this page were rendered
+by Blender {version}{samples}.
 
     make setup-blender     # install Blender's wheels, 400 MB each
     make test-blender      # render and check all scenes; JSON and images go to out/blender
 
-- *mean*: mean of the image by Wavecomb over that by Cycles.
+- *mean*: mean of Wavecomb's image divided by the mean of Cycles' image.
 - *blocks*: fraction of blocks of 12 x 12 pixels that differ by more than 2 % and four standard
   errors.
-- *difference*: reason and bound where the models differ. Without one, the means must agree within
-  1 %.
+- *difference*: reason and bound of a difference between the models of the two renderers. Where the
+  column is empty, the means of the images must agree within 1 %.
 
 Each pair of images shows Cycles to the left and Wavecomb to the right.
+"""
+
+FOOT = """## Limits
+
+Most scenes test one feature in a small image. Production files of Blender were not compared.
 """
 
 
@@ -69,7 +75,7 @@ def main(folder: Path, kept: Kept) -> None:
             print(f"outside of its bounds: {name} {row['ratio']:.4f} {row['outside']:.3f}")
     version = next(iter(rows.values()))["blender"]
     is_half = os.environ.get("PARITY_SPP") == "0.5"
-    samples = ", half of the tests' samples" if is_half else ""
+    samples = " with half of the samples that the tests use" if is_half else ""
     text = [HEAD.format(version=version, samples=samples)]
     for group in sorted({row["group"] for row in rows.values()} | set(kept)):
         before = kept.get(group, {})
@@ -84,7 +90,7 @@ def main(folder: Path, kept: Kept) -> None:
         )
         text += lines.values()
         text.append("")
-    PAGE.write_text("\n".join(text))
+    PAGE.write_text("\n".join([*text, FOOT]))
 
 
 def _line(name: str, row: dict[str, Any]) -> str:
