@@ -285,7 +285,7 @@ def combined_mirrors() -> None:
     show_lights()
 
 
-HIDDEN = "mirrors do not show lights that the camera does not see, and cast no caustics of them"
+HIDDEN = "mirrors neither show hidden lights nor cast their caustics"
 
 
 @scene("Combined", 0.87, 0.94, 0.45, HIDDEN, messages=("mirrors and clear glass do not show",))
