@@ -14,6 +14,16 @@ relative to Wavecomb, with its standard error in percent:
 The stages `dome` and `sun` are balls of all materials of `mixed` under a white dome and under a sun
 of 15 degrees at the side of the camera, with one scattering; `mixed-lamps` is the stage of the
 comparison of speed.
+
+Causes of the differences on opaque materials:
+
+- Mitsuba's principled adds the reflection of the interface to an undimmed base, so a white floor
+  reflects more than it receives, and adds retro-reflection. It has no multiple scattering between
+  microfacets (0.2, 1.1 and 3.6 % of the light at roughness 0.16, 0.24 and 0.34), and does not dim
+  layers below a coat.
+- Cycles dims the base by 1 - E(view), without a factor for the direction of the light. Under a
+  uniform dome this has the same albedo as Wavecomb's formula. Its area lights do not block the
+  dome, and its bounces do not count straight transmissions.
 """
 
 from __future__ import annotations
