@@ -15,7 +15,7 @@ from parts import not_here
 
 ROOT = Path(__file__).resolve().parents[2]
 RESULTS = sorted((ROOT / "benchmarks" / "results").glob("*.json"))
-OLD = {"claims", "noise_target", "peers", "peers-dragon"}
+OLD = {"claims", "noise_target"}
 """Result files that have fewer than five rounds or do not record their command."""
 RECENT = 40
 """Number of commits to src/ after which a result must be measured again."""
