@@ -4,6 +4,7 @@
 #include "wavecomb/path/path_pool.h"
 
 #include <algorithm>
+#include <array>
 #include <numeric>
 
 #include "lane_testing.h"
@@ -162,8 +163,9 @@ TEST(PathAovs, TechniquesKeepApart) {
   aovs.light<Technique::kLightSample, float>({0, slot, {1.f, 2.f, 3.f}}, kNoGroup, true);
   aovs.light<Technique::kConnection, float>({1, slot, {1.f, 1.f, 1.f}}, 0, true);
   Film film(1, 1, {AovSet{static_cast<uint32_t>(Aov::kByBounces)}});
-  const RadianceRow<float> radiance[3] = {{}, {}, {{6.f, 7.f, 8.f}}};
-  aovs.resolve(film.aovs(), 0, 2, 3, &radiance[0].sum.x);
+  std::array<float, 3 * kRadianceWords> radiance{};
+  store_row<RadianceRow, float>(radiance.data(), slot, {{6.f, 7.f, 8.f}}, true);
+  aovs.resolve(film.aovs(), 0, slot, slot + 1, radiance.data());
   const double* by_bounces = film.aovs().sums(Aov::kByBounces, 0);
   EXPECT_EQ(by_bounces[0], 4.0);
   EXPECT_EQ(by_bounces[1], 4.0);

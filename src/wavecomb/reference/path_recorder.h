@@ -23,7 +23,7 @@ class PathRecorder {
         rays_(context, worker.counts, worker.aovs),
         aovs_(worker.aovs),
         events_(worker.events(context)),
-        radiance_(worker.radiance) {}
+        radiance_(worker.radiance.row) {}
 
   /// Adds the light of a path that leaves the scene or hits the shape of a light.
   void add_ended(uint32_t depth, const PathState<F>& path, const SingleHit& hit) {

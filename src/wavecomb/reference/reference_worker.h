@@ -2,9 +2,18 @@
 /// Buffers of a worker of the reference integrator.
 #pragma once
 
+#include <array>
+
 #include "wavecomb/reference/reference.h"
 
 namespace wavecomb {
+
+/// Radiance of one path, with the padding that rows have in memory.
+struct StoredRadiance {
+  RadianceRow<float> row{};
+  std::array<float, kRadianceWords - sizeof(RadianceRow<float>) / sizeof(float)> padding{};
+};
+static_assert(sizeof(StoredRadiance) == kRadianceWords * sizeof(float));
 
 /// Buffers of a worker of the reference integrator.
 ///
@@ -18,13 +27,13 @@ struct ReferenceWorker {
         nested_media(context.has_medium_stack() ? 1 : 0) {}
   /// Returns the object that records the events of the traced path.
   PathEvents events(const WaveContext& context) {
-    return {context.scene, *context.camera, aovs, history, &radiance.sum.x};
+    return {context.scene, *context.camera, aovs, history, &radiance.row.sum.x};
   }
 
   PhaseClock clock;
   Counts counts;
   // State of the traced path, in slot 0.
-  RadianceRow<float> radiance{};
+  StoredRadiance radiance;
   PathAovs aovs;
   PathHistory history;
   JointTransport::Buffers joint;
