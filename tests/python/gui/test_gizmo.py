@@ -64,7 +64,10 @@ def moved(window, qtbot, tmp_path):
         window.session.select(path)
         view.setFocus()
         QTest.keyClick(view, key)
-        at = QPoint(*map(round, view.gizmo.handles()[handle][end]))
+        points = view.gizmo.handles()[handle]
+        at = QPoint(*map(round, points[end]))
+        if by is None:  # along the ring
+            by = [round(to - start) for start, to in zip(points[end], points[end + 3], strict=True)]
         QTest.mousePress(view, Qt.MouseButton.LeftButton, pos=at)
         for step in range(1, 5):
             QTest.mouseMove(view, at + QPoint(by[0] * step // 4, by[1] * step // 4))
@@ -251,7 +254,7 @@ def test_rotation_follows_the_cursor_and_scale_the_axes_of_the_prim(moved):
     moved.session.change(spp=1)
     before = world(moved, KEY)
     ring = 12
-    moved.drag(KEY, Qt.Key.Key_E, "z", (-15, -15), ring)
+    moved.drag(KEY, Qt.Key.Key_E, "z", None, ring)
     turned = world(moved, KEY)
     assert np.allclose(turned[3], before[3], atol=1e-6), "about its origin"
     assert np.allclose(np.linalg.norm(turned[:3, :3], axis=1), 1.0)
