@@ -6,7 +6,7 @@
     .venv/bin/python benchmarks/peers/brightness.py --stages shot.usd --max-depth 1
 
 Renders each stage with several seeds, and prints the mean brightness over the pixels of a material,
-relative to Wavecomb, with its standard error in percent:
+relative to Wavecomb, with its standard error:
 
 - same: Mitsuba with Wavecomb's formulas (mitsuba_preview.py), which must agree within noise;
 - Mitsuba, Cycles: with the models of these renderers.
@@ -34,7 +34,6 @@ import json
 import shlex
 import sys
 import time
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -171,7 +170,7 @@ def measure(name: str, args: argparse.Namespace) -> dict[str, Any]:
     base = {k: means(ours, m) for k, m in covers.items()}
     out: dict[str, Any] = {k: {"cover": float(m.mean())} for k, m in covers.items()}
     for label in args.renderers:
-        theirs = images(OTHERS[label], replace(job), args)
+        theirs = images(OTHERS[label], job, args)
         for material, matte in covers.items():
             (a, da), (b, db) = base[material], means(theirs, matte)
             if a > 0.0:
