@@ -200,24 +200,7 @@ class PathAovs : public PathFirstHits, public PathCostRows {
   /// their scattering events, updates the light path expressions.
   template <Technique kTechnique, typename F>
   void light(const LightEvent<F>& e, const UInt<F>& source, const Mask<F>& active) const {
-    constexpr bool kIsVolume = kTechnique == Technique::kVolume;
-    constexpr bool kIsSample = kTechnique == Technique::kLightSample;
-    if (groups_) {
-      UInt<F> group = source;
-      if constexpr (kIsVolume)
-        group = UInt<F>(tables_->group_of_rest);
-      else if constexpr (!kIsSample)
-        group = group_of<F>(source, active);
-      add_to_group<F>(e.slot, group, e.c, active);
-    }
-    if (expressions_) {
-      if constexpr (kIsVolume)
-        expressions_.add_volume_emission<F>(e.slot, e.c, active);
-      else if constexpr (kIsSample)
-        expressions_.add_light_sample<F>(e.slot, e.c, active);
-      else if constexpr (kTechnique == Technique::kEmitter)
-        expressions_.add<F>(e.slot, source, e.c, active);
-    }
+    add_by_light<kTechnique, F>(e.slot, e.c, source, active);
     add_by_technique<kTechnique, F>(e.slot, e.c, active);
     if constexpr (kTechnique == Technique::kConnection)
       if (early_connections_ && e.depth == 0)
@@ -234,8 +217,7 @@ class PathAovs : public PathFirstHits, public PathCostRows {
         scene, settings, e.depth, path, active,
         [&](uint32_t light) { return expressions_ || tables_->film_group[light] != kNoGroup; },
         [&](uint32_t light, const Color<F>& share) {
-          if (groups_) add_to_group<F>(e.slot, group_of<F>(UInt<F>(light), active), share, active);
-          if (expressions_) expressions_.add<F>(e.slot, UInt<F>(light), share, active);
+          add_by_light<Technique::kEmitter, F>(e.slot, share, UInt<F>(light), active);
         });
   }
 
@@ -313,6 +295,29 @@ class PathAovs : public PathFirstHits, public PathCostRows {
     const Mask<F> grouped = active & Mask<F>(group != UInt<F>(kNoGroup));
     if (any(grouped))
       add_radiance<F>(groups_.rows, slot * layout_.light_groups + group, c, grouped);
+  }
+  /// Adds `c` to the AOVs that separate lights. `source` has the meaning that it has in light().
+  template <Technique kTechnique, typename F>
+  void add_by_light(const UInt<F>& slot, const Color<F>& c, const UInt<F>& source,
+                    const Mask<F>& active) const {
+    constexpr bool kIsVolume = kTechnique == Technique::kVolume;
+    constexpr bool kIsSample = kTechnique == Technique::kLightSample;
+    if (groups_) {
+      UInt<F> group = source;
+      if constexpr (kIsVolume)
+        group = UInt<F>(tables_->group_of_rest);
+      else if constexpr (!kIsSample)
+        group = group_of<F>(source, active);
+      add_to_group<F>(slot, group, c, active);
+    }
+    if (expressions_) {
+      if constexpr (kIsVolume)
+        expressions_.add_volume_emission<F>(slot, c, active);
+      else if constexpr (kIsSample)
+        expressions_.add_light_sample<F>(slot, c, active);
+      else if constexpr (kTechnique == Technique::kEmitter)
+        expressions_.add<F>(slot, source, c, active);
+    }
   }
   template <Technique kTechnique, typename F>
   void add_by_technique(const UInt<F>& slot, const Color<F>& c, const Mask<F>& active) const {

@@ -138,10 +138,14 @@ class PathEvents {
     const VertexResult<F>& v = e.at.result;
     UInt<F> group(0u);
     const Mask<F> emits = active & not_(is_black(v.emitted));
-    if (any(emits)) add_radiance<F>(radiance_, e.slot, v.emitted, emits);
+    if (any(emits)) {
+      if constexpr (kRecords)
+        light<Technique::kEmitter, F>(
+            {e.depth, e.slot, v.emitted}, [&] { return e.aovs.emitter; }, emits);
+      else
+        add_radiance<F>(radiance_, e.slot, v.emitted, emits);
+    }
     if constexpr (kRecords) {
-      if (aovs_.wants(Technique::kEmitter) && any(emits))
-        aovs_.light<Technique::kEmitter, F>({e.depth, e.slot, v.emitted}, e.aovs.emitter, emits);
       if (aovs_.wants_lights()) {
         group = aovs_.group_of<F>(e.aovs.light_id, v.has_shadow);
         if (aovs_.expressions())
