@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import cpu_times
+import crashes
 import parts
 import pytest
 import tiers
@@ -27,6 +28,7 @@ if os.environ.pop("PYTHONDONTWRITEBYTECODE", None):
     sys.dont_write_bytecode = False
 
 
+@pytest.hookimpl(trylast=True)
 def pytest_configure(config: pytest.Config) -> None:
     """Compile the package once, before workers start, and let SIGINT stop child processes.
 
@@ -34,8 +36,16 @@ def pytest_configure(config: pytest.Config) -> None:
     """
     if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
-    if not hasattr(config, "workerinput"):
+    if hasattr(config, "workerinput"):
+        crashes.write_stacks(config)
+    else:
         compileall.compile_dir(parts.PACKAGE, quiet=2)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_configure_node(node: Any) -> None:
+    """Tell a worker where to write the stacks of its threads if it crashes."""
+    crashes.give_folder(node.workerinput)
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -131,10 +141,10 @@ def pytest_runtest_logreport(report: pytest.TestReport) -> None:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Print the files and tests that took the most CPU time."""
+    """Print the files and tests that took the most CPU time, and the stacks of lost workers."""
     cpu_times.save()
-    lines = cpu_times.table()
-    if lines:
-        terminalreporter.section("CPU time")
-        for line in lines:
-            terminalreporter.line(line)
+    for title, lines in (("CPU time", cpu_times.table()), ("lost workers", crashes.report())):
+        if lines:
+            terminalreporter.section(title)
+            for line in lines:
+                terminalreporter.line(line)

@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import subprocess
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -75,10 +77,26 @@ def test_a_layer_that_is_a_fifo(tmp_path: Path, fifo: Any, way: str, isolate: st
     refused(done, "f.usda", "between.usda" if "of a" in way else "s.usda")
 
 
-def test_a_program_that_loads_such_a_stage(tmp_path: Path, fifo: Any) -> None:
+@pytest.mark.parametrize("busy_threads", [0, 1])
+def test_a_program_that_loads_such_a_stage(tmp_path: Path, fifo: Any, busy_threads: int) -> None:
+    """Threads that compute something else must not hide that the thread of `load` waits."""
     fifo("f.usda")
-    with pytest.raises(WavecombError, match=r"s\.usda: names the layer .*f\.usda.*FIFO"):
-        wavecomb.load(stage(tmp_path, *LAYERS["reference"]))
+    done = threading.Event()
+
+    def compute() -> None:
+        while not done.is_set():
+            hashlib.pbkdf2_hmac("sha256", b"", b"", 20_000)  # releases the interpreter
+
+    threads = [threading.Thread(target=compute) for _ in range(busy_threads)]
+    for thread in threads:
+        thread.start()
+    try:
+        with pytest.raises(WavecombError, match=r"s\.usda: names the layer .*f\.usda.*FIFO"):
+            wavecomb.load(stage(tmp_path, *LAYERS["reference"]))
+    finally:
+        done.set()
+        for thread in threads:
+            thread.join()
 
 
 MATERIAL = """

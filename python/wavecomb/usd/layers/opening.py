@@ -3,10 +3,7 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
-import threading
-import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -16,93 +13,14 @@ from pathlib import Path
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdRender, UsdUtils
 
 from wavecomb.errors import WavecombError
-from wavecomb.image.files.output_file import check_name, check_regular, kind_of
+from wavecomb.image.files.output_file import check_name, check_regular
 from wavecomb.path_maps import mapped, own_maps
 from wavecomb.run.isolation import progress_notes, time_limit
 from wavecomb.usd import mtlx
+from wavecomb.usd.layers.fifos import abort_on_fifo
 from wavecomb.usd.layers.population import load_payloads, matching_prims, populate
 from wavecomb.usd.lights.light import KINDS as LIGHT_KINDS
 from wavecomb.usd.stage.report import LoadReport, capture_diagnostics, first_message
-
-_TICK_S = 0.25
-_IDLE = 0.1
-"""Maximum CPU load (CPU time / wall time) of a process that may be waiting for a FIFO."""
-
-
-@contextmanager
-def abort_on_fifo() -> Iterator[None]:
-    """Aborts the ``with`` block, which opens layers, if USD waits for a FIFO.
-
-    While the process is idle, a thread checks whether loaded layers refer to FIFOs. A child process
-    with a supervising parent ends with a one-line message. In other processes the thread opens the
-    FIFO for writing and closes it, so that USD reads an empty layer; the block then raises
-    WavecombError.
-
-    Raises:
-        WavecombError: A layer refers to a FIFO, and USD waited for data from the FIFO.
-    """
-    done, found = threading.Event(), _BlockingFifo()
-    thread = threading.Thread(target=_watch, args=(done, found), daemon=True)
-    thread.start()
-    try:
-        yield
-    except Exception:
-        if found.line is not None:
-            raise WavecombError(found.line) from None
-        raise
-    finally:
-        done.set()
-        thread.join()
-    if found.line is not None:
-        raise WavecombError(found.line)
-
-
-class _BlockingFifo:
-    """The first FIFO that USD waited for.
-
-    Attributes:
-        line: Message that names the FIFO.
-    """
-
-    line: str | None = None
-
-
-def _watch(done: threading.Event, found: _BlockingFifo) -> None:
-    clock, computed = time.monotonic(), time.process_time()
-    while not done.wait(_TICK_S):
-        now, so_far = time.monotonic(), time.process_time()
-        is_idle = so_far - computed < _IDLE * (now - clock)
-        clock, computed = now, so_far
-        if is_idle:
-            for path, layer in _fifos():
-                if not done.is_set():
-                    _release(path, layer, found)
-
-
-def _fifos() -> Iterator[tuple[str, str]]:
-    """Yields FIFOs that loaded layers reference as layers, each with the referencing layer."""
-    for layer in Sdf.Layer.GetLoadedLayers():
-        try:
-            named = [layer.ComputeAbsolutePath(n) for n in layer.GetCompositionAssetDependencies()]
-            name = layer.realPath or layer.identifier
-        # Skip a layer that the thread that composes the stage has released.
-        except Exception:
-            continue
-        for path in named:
-            if path and kind_of(path) == "a FIFO":
-                yield path, name
-
-
-def _release(path: str, layer: str, found: _BlockingFifo) -> None:
-    line = f"{layer}: names the layer {path}, which is a FIFO, not a regular file; name a file"
-    if progress_notes.is_expendable():
-        time_limit.end_process(line)
-        return
-    # Opening the FIFO fails if it has no reader, that is, if USD is not waiting for it.
-    with contextlib.suppress(OSError):
-        os.close(os.open(path, os.O_WRONLY | os.O_NONBLOCK))
-        found.line = found.line or line
-
 
 MAX_SURVEYED = 4096
 """Maximum number of cameras and lights in a survey, since instancing can multiply them."""
