@@ -31,8 +31,6 @@ class Translation:
         instancing: Whether the exporter wrote instances as prototypes.
         instanced: Names of materials of instances.
         bakes: Sockets of materials to bake (``textures``).
-        hidden_lights: Names of lights without a shape that Cycles shows in mirrors.
-        has_mirrors: Whether a material reflects or refracts without any roughness.
     """
 
     depsgraph: Any
@@ -45,8 +43,6 @@ class Translation:
     instancing: bool = False
     instanced: set[str] = field(default_factory=set)
     bakes: list[dict[str, Any]] = field(default_factory=list)
-    hidden_lights: list[str] = field(default_factory=list)
-    has_mirrors: bool = False
 
     @property
     def scene(self) -> Any:

@@ -14,7 +14,7 @@ import bpy
 from .camera import CAMERA, write_camera
 from .context import Translation
 from .curves import write_curves
-from .lights import report_hidden_lights, write_lights
+from .lights import write_lights
 from .materials import write_materials
 from .motion import Sampled, write_motion
 from .report import Report
@@ -177,7 +177,6 @@ def export_stage(
     write_lights(into)
     write_world(into)
     write_materials(into)
-    report_hidden_lights(into)
     write_textures(into)
     write_curves(into)
     write_visibility(into)

@@ -58,9 +58,9 @@ def _write(into: Translation, thing: Any, path: str, samples: dict[float, Any]) 
         prim.set("string wavecomb:lightGroup", thing.lightgroup)
     _links(into, thing, prim)
     if into.scene.wavecomb.lights == "auto" and not thing.visible_camera:
-        prim.set("bool wavecomb:visible", False)
-        if _has_shape(light) and (_sees(thing, "glossy") or _sees(thing, "transmission")):
-            into.hidden_lights.append(thing.name)
+        prim.set("bool primvars:wavecomb:visibility:camera", False)
+        if not (_sees(thing, "glossy") or _sees(thing, "transmission")):
+            prim.set("bool primvars:wavecomb:visibility:bounces", False)
     hidden = [k for k in ("diffuse", "glossy", "transmission") if not _sees(thing, k)]
     if hidden:
         into.report.miss(f"light hidden from {' and '.join(hidden)} rays", thing.name)
@@ -68,21 +68,6 @@ def _write(into: Translation, thing: Any, path: str, samples: dict[float, Any]) 
 
 def _sees(thing: Any, kind: str) -> bool:
     return bool(getattr(thing, f"visible_{kind}", True))
-
-
-def report_hidden_lights(into: Translation) -> None:
-    """Reports lights that Cycles hides from the camera but shows in the scene's mirrors."""
-    if into.has_mirrors:
-        for name in into.hidden_lights:
-            into.report.approximate(
-                "mirrors and clear glass do not show a light that the camera "
-                "does not see (see Light Shapes)",
-                name,
-            )
-
-
-def _has_shape(light: Any) -> bool:
-    return light.type == "AREA" or (light.type != "SUN" and light.shadow_soft_size > 0.0)
 
 
 def _is_portal(light: Any) -> bool:

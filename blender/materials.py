@@ -8,7 +8,7 @@ from typing import Any
 from .context import OWN, ROOT, Translation, material_path
 from .graph import Graph, Value, colour, number
 from .hair import write_hair
-from .neutral import BLACK, NEUTRAL, Surface, is_mirror, is_zero
+from .neutral import BLACK, NEUTRAL, Surface, is_zero
 from .nodes import Nodes
 from .normals import write_displacement
 from .surfaces import surface_of
@@ -83,7 +83,6 @@ def _write(into: Translation, path: str, surface: Surface, graph: Graph | None) 
     shader.set("uniform token info:id", "ND_open_pbr_surface_surfaceshader")
     graph = graph or Graph(into.layer, path)
     emits = not is_zero(surface["emission_color"])
-    into.has_mirrors |= is_mirror(surface)
     for key, value in sorted(surface.items()):
         if key == "geometry_thin_walled":
             shader.set("bool inputs:geometry_thin_walled", True)

@@ -40,8 +40,6 @@ NEUTRAL: Surface = {
     "geometry_opacity": number(1.0),
 }
 """A white diffuse surface, whose values are the defaults of other surfaces."""
-SHARP_ROUGHNESS = 1e-3**0.5
-"""Roughness below which Wavecomb reflects and refracts like a mirror (``kDeltaAlpha``)."""
 
 
 def is_zero(value: Value) -> bool:
@@ -50,18 +48,3 @@ def is_zero(value: Value) -> bool:
     return constant is not None and not any(
         constant if isinstance(constant, tuple) else (constant,)
     )
-
-
-def is_mirror(surface: Surface) -> bool:
-    """Returns whether a surface reflects or refracts light without any roughness.
-
-    Roughness that nodes compute counts as roughness.
-    """
-
-    def is_sharp(roughness: Value) -> bool:
-        return roughness.constant is not None and roughness.constant < SHARP_ROUGHNESS
-
-    weights = ("specular_weight", "base_metalness", "transmission_weight")
-    if is_sharp(surface["specular_roughness"]) and not all(is_zero(surface[w]) for w in weights):
-        return True
-    return is_sharp(surface["coat_roughness"]) and not is_zero(surface["coat_weight"])

@@ -64,7 +64,10 @@ class WavecombSettings(bpy.types.PropertyGroup):
         name="Light Shapes", description="Whether camera and mirrors see the shapes of lights, "
         "and whether these block other light",
         items=[
-            ("auto", "By Ray Visibility", "A light is hidden if the camera does not see it"),
+            (
+                "auto", "By Ray Visibility",
+                "Reflections show the lights that the camera does not see",
+            ),
             ("visible", "Visible", ""), ("hidden", "Hidden", ""),
         ],
         default="auto",

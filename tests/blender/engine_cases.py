@@ -329,22 +329,6 @@ def report(folder: Path) -> None:
     emit(error=message, lines=[x for x in lines.getvalue().splitlines() if "wavecomb: " in x])
 
 
-def mirrors(folder: Path) -> None:
-    """Renders a light that the camera does not see with a rough metal, a mirror, and as visible."""
-    scene, ball = _ball(1)
-    shader = build.shader_of(ball.material_slots[0].material)
-    shader.inputs["Metallic"].default_value = 1.0
-    found = []
-    for roughness, shapes in ((0.2, "auto"), (0.0, "auto"), (0.0, "visible")):
-        shader.inputs["Roughness"].default_value = roughness
-        scene.wavecomb.lights = shapes
-        lines = io.StringIO()
-        with contextlib.redirect_stdout(lines):
-            _message(scene)
-        found.append([x for x in lines.getvalue().splitlines() if "wavecomb: " in x])
-    emit(lines=found)
-
-
 def _deforming() -> None:
     """Adds a cube whose shape keys move over the frames, with a texture that is baked."""
     material = build.principled("b")
@@ -382,7 +366,6 @@ if __name__ == "__main__":
             standby,
             full,
             report,
-            mirrors,
             cryptomatte,
             passes,
             animation,

@@ -285,10 +285,7 @@ def combined_mirrors() -> None:
     show_lights()
 
 
-HIDDEN = "mirrors neither show hidden lights nor cast their caustics"
-
-
-@scene("Combined", 0.87, 0.94, 0.45, HIDDEN, messages=("mirrors and clear glass do not show",))
+@scene("Combined")
 def combined_mirrors_hidden_light() -> None:
     """The same mirrors with lights that the camera does not see."""
     _mirrors()

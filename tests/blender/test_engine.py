@@ -84,17 +84,6 @@ def test_report_lists_what_is_missing(blender: Run, tmp_path: Path) -> None:
     assert "approximated: displacement (a bump instead): material" in lines[1]
 
 
-def test_report_lists_lights_that_mirrors_do_not_show(blender: Run, tmp_path: Path) -> None:
-    """One line names a light that the camera does not see, if a material is a mirror."""
-    row = _rows(blender(str(HERE / "engine_cases.py"), "mirrors", str(tmp_path)))
-    lines = row["lines"]
-    assert isinstance(lines, list)
-    rough, mirror, visible = lines
-    assert rough == visible == []
-    assert len(mirror) == 1 and "approximated: mirrors and clear glass" in mirror[0]
-    assert mirror[0].endswith(": light")
-
-
 def test_cryptomatte_has_the_ids_of_cycles(blender: Run, tmp_path: Path) -> None:
     """Cryptomatte ids of the first rank equal Cycles' ids and cover the same number of pixels."""
     row = _rows(blender(str(HERE / "engine_cases.py"), "cryptomatte", str(tmp_path)))

@@ -86,10 +86,13 @@ class Integrator {
     return {&o.x, &o.y,  &o.z,   &d.x, &d.y,
             &d.z, &tfar, &kSlot, 1,    scene_.has_motion ? &time_ : nullptr};
   }
-  Hit closest(const Vec3<F>& o, const Vec3<F>& d, F tfar) {
+  /// `after_delta` is whether the ray starts with a delta bounce.
+  Hit closest(const Vec3<F>& o, const Vec3<F>& d, F tfar, bool after_delta = false) {
     Hit h;
     uint32_t words[2];
-    const PresenceKeys keys = fresh_keys(words);
+    PresenceKeys keys = fresh_keys(words);
+    const F delta_pdf = 0;
+    if (after_delta) keys.bounce_pdf = &delta_pdf;
     accel_.intersect(span(o, d, tfar), {&h.t, &h.u, &h.v, &h.prim, &h.geom, &h.inst}, 1, false,
                      keys);
     return h;
@@ -155,7 +158,7 @@ class Integrator {
   }
 
   Rgb radiance(Ray ray, uint32_t depth, F tfar) {
-    const Hit hit = closest(ray.o, ray.d, tfar);
+    const Hit hit = closest(ray.o, ray.d, tfar, ray.is_seen && depth > 0);
     ray.cone_width = ray.cone_spread * hit.t + ray.cone_width;
     if (hit.inst == kNoHit) {
       Rgb sum(0.f);
@@ -357,7 +360,7 @@ class Integrator {
       const uint32_t i = hit.inst == kLightShape ? kNoLight : mesh_light_of(hit);
       if (i == kNoLight) continue;
       const LightRecord& light = scene_.lights.lights[i];
-      if (!is_apart(light) || light.hidden != 0 || !lights_class(i, ray.link)) continue;
+      if (!is_apart(light) || light.visibility != 0 || !lights_class(i, ray.link)) continue;
       Rgb c = triple(light.radiance);
       if (static_cast<MaterialSync>(light.sync) != MaterialSync::kIndependent)
         c = c * glow(hit, ray);
@@ -377,7 +380,7 @@ class Integrator {
       const uint32_t record = view.mesh_lights[i - view.first_triangle];
       if (record == kNoLight) continue;
       const LightRecord& light = view.lights[record];
-      if (light.hidden == 0 || !lights_class(record, ray.link)) continue;
+      if (light.visibility == 0 || !lights_class(record, ray.link)) continue;
       const TriangleLight& triangle = view.triangles[i - view.first_triangle];
       const F t = static_cast<F>(meets(triangle, ray.o, ray.d));
       if (!(t > 0) || triangle.varies()) continue;

@@ -126,7 +126,7 @@ def test_fingerprints_stay_as_they_are() -> None:
         mesh_light={"material_sync": "independent", "name": "/M", "color": (3, 2, 1),
                     "normalize": True, "focus": 1, "visible": False, "transform": at},
     )  # fmt: skip
-    assert scene.fingerprint()["lights"] == "e17f3605ea93c4ad"
+    assert scene.fingerprint()["lights"] == "fbe5bb3c2e3690f4"
 
 
 @pytest.mark.parametrize(

@@ -62,7 +62,7 @@ def inner(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytest.
     for name in ("CI", "WAVECOMB_STRICT", "WAVECOMB_LONG"):
         monkeypatch.delenv(name, raising=False)
     pytester.makeconftest((HERE / "conftest.py").read_text())
-    for name in ("cpu_times", "parts", "tiers"):
+    for name in ("cpu_times", "crashes", "parts", "tiers"):
         pytester.makepyfile(**{name: (HERE / f"{name}.py").read_text()})
     (pytester.path / "long_tests.txt").write_text("")
     pytester.makeini("[pytest]\nmarkers = long: minutes")

@@ -27,6 +27,8 @@ class Lights:
         self, random: Generator, folder: Path, materials: Materials, linked: list[str]
     ) -> None:
         self.random = random
+        # Own numbers, so that the stages of earlier seeds keep everything else.
+        self.shapes = random.spawn(1)[0]
         self.folder = folder
         self.materials = materials
         self.linked = linked
@@ -152,6 +154,9 @@ class Lights:
                 f"float inputs:diffuse = {self.between(0, 2):.3f}",
                 f"float inputs:specular = {self.between(0, 2):.3f}",
             ]
+        if kind in ("Rect", "Disk", "Sphere", "Cylinder") and self.shapes.random() < 0.12:
+            self.features.append("hidden from the camera")
+            lines = [*lines, "bool primvars:wavecomb:visibility:camera = 0"]
         for link in ("lightLink", "shadowLink"):
             if self.linked and self.chance(0.15):
                 self.features.append(link)

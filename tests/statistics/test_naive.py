@@ -66,6 +66,7 @@ def test_everything_is_among_the_scenes(tmp_path: Path) -> None:
         "portal", "instances", "moving", "cage", "lightLink", "shadowLink", "multipliers",
         "meshlight light", "rect light", "disk light", "sphere light", "cylinder light",
         "distant light", "dome light", "cosine sampling", "hidden lights", "lens",
+        "hidden from the camera",
     ):  # fmt: skip
         assert counts[feature] >= 1, feature
     assert counts["glow that is cut out"] >= 3, "the fault that began this"

@@ -60,6 +60,10 @@ struct PresenceKeys {
   const uint32_t* shadow_set = nullptr;
   uint32_t shadow_stride = 0;
   uint32_t ray_kind = kVisibleToCamera;  ///< a RayVisibility flag
+  /// For each ray, PathRow::pdf, which is 0 after a delta bounce; the stride is the same as for
+  /// `pixel_hash`. Null for camera rays, shadow rays and light paths, which do not hit lights of
+  /// ShapeVisibility::kDeltaBounces.
+  const float* bounce_pdf = nullptr;
   /// For each ray, the only object that it can hit, as returned by `object_of`. The stride is the
   /// same as for `pixel_hash`. Rays that are restricted to an object hit no lights. Null means that
   /// rays can hit all objects.

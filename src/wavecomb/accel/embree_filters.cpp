@@ -59,13 +59,15 @@ inline void keep_closest(const RTCFilterFunctionNArguments* args) {
   }
 }
 
-/// Intersects ray `i` of a packet with the light that the user pointer of an Embree geometry refers
-/// to. Returns the distance to the light, or 0 for a miss.
-float intersect_light_shape(const void* user, RTCRayN* ray, unsigned n, unsigned i) {
+const LightGeometry& light_of(const void* user) {
+  return *static_cast<const LightGeometry*>(user);
+}
+
+/// Intersects ray `i` of a packet with a light. Returns the distance to the light, or 0 for a miss.
+float intersect_light_shape(const LightGeometry& light, RTCRayN* ray, unsigned n, unsigned i) {
   const float o[3] = {RTCRayN_org_x(ray, n, i), RTCRayN_org_y(ray, n, i), RTCRayN_org_z(ray, n, i)};
   const float d[3] = {RTCRayN_dir_x(ray, n, i), RTCRayN_dir_y(ray, n, i), RTCRayN_dir_z(ray, n, i)};
-  const float t = intersect_custom_shape(*static_cast<const LightGeometry*>(user), o, d,
-                                         RTCRayN_time(ray, n, i));
+  const float t = intersect_custom_shape(light, o, d, RTCRayN_time(ray, n, i));
   return t > 0.f && t <= RTCRayN_tfar(ray, n, i) ? t : 0.f;
 }
 
@@ -119,9 +121,10 @@ void intersect_lights(const RTCIntersectFunctionNArguments* args) {
   const unsigned n = args->N;
   RTCRayN* ray = RTCRayHitN_RayN(args->rayhit, n);
   RTCHitN* hit = RTCRayHitN_HitN(args->rayhit, n);
+  const LightGeometry& light = light_of(args->geometryUserPtr);
   for (unsigned i = 0; i < n; ++i) {
-    if (args->valid[i] == 0) continue;
-    const float t = intersect_light_shape(args->geometryUserPtr, ray, n, i);
+    if (args->valid[i] == 0 || !is_hit_by(light, *best->keys, RTCRayN_id(ray, n, i))) continue;
+    const float t = intersect_light_shape(light, ray, n, i);
     if (t == 0.f || t > best->t[i]) continue;
     // Among hits at equal distance, choose the hit with the smaller instance id, and among hits on
     // the same instance the hit with the smaller geometry id. Objects in world space have the
@@ -142,9 +145,11 @@ void intersect_lights_bare(const RTCIntersectFunctionNArguments* args) {
   const unsigned n = args->N;
   RTCRayN* ray = RTCRayHitN_RayN(args->rayhit, n);
   RTCHitN* hit = RTCRayHitN_HitN(args->rayhit, n);
+  const LightGeometry& light = light_of(args->geometryUserPtr);
+  if (light.delta_bounces_only) return;
   for (unsigned i = 0; i < n; ++i) {
     if (args->valid[i] == 0) continue;
-    const float t = intersect_light_shape(args->geometryUserPtr, ray, n, i);
+    const float t = intersect_light_shape(light, ray, n, i);
     if (t == 0.f) continue;
     RTCRayN_tfar(ray, n, i) = t;
     RTCHitN_primID(hit, n, i) = 0;
@@ -154,9 +159,10 @@ void intersect_lights_bare(const RTCIntersectFunctionNArguments* args) {
 }
 
 void occlude_lights(const RTCOccludedFunctionNArguments* args) {
+  const LightGeometry& light = light_of(args->geometryUserPtr);
+  if (light.delta_bounces_only) return;
   for (unsigned i = 0; i < args->N; ++i)
-    if (args->valid[i] != 0 &&
-        intersect_light_shape(args->geometryUserPtr, args->ray, args->N, i) > 0.f)
+    if (args->valid[i] != 0 && intersect_light_shape(light, args->ray, args->N, i) > 0.f)
       RTCRayN_tfar(args->ray, args->N, i) = -std::numeric_limits<float>::infinity();
 }
 
@@ -170,7 +176,7 @@ void store_bounds(const Bounds& b, RTCBounds& out) {
 }
 
 void light_box(const RTCBoundsFunctionArguments* args) {
-  const Bounds b = custom_shape_bounds(*static_cast<const LightGeometry*>(args->geometryUserPtr));
+  const Bounds b = custom_shape_bounds(light_of(args->geometryUserPtr));
   store_bounds(b, *args->bounds_o);
 }
 

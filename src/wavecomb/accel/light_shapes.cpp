@@ -51,7 +51,8 @@ Bounds box_at_mid_shutter(const LightGeometry& shape) {
 
 bool LightGeometry::operator==(const LightGeometry& other) const {
   const LightRecord &a = light, &b = other.light;
-  return shape == other.shape && a.kind == b.kind && a.radius == b.radius &&
+  return shape == other.shape && delta_bounces_only == other.delta_bounces_only &&
+         a.kind == b.kind && a.radius == b.radius &&
          std::ranges::equal(a.p, b.p) && std::ranges::equal(a.u, b.u) &&
          std::ranges::equal(a.v, b.v) && std::ranges::equal(motion.origin, other.motion.origin) &&
          steps == other.steps;
@@ -64,9 +65,12 @@ std::vector<LightGeometry> light_shapes(const Scene& scene) {
     const size_t number = shapes.size();
     LightGeometry& geometry = shapes.emplace_back();
     const LightKindInfo& kind = info_of(static_cast<LightKind>(record.kind));
-    if (!kind.shape || !(record.area > 0) || record.hidden != 0) continue;
+    const auto visibility = static_cast<ShapeVisibility>(record.visibility);
+    if (!kind.shape || !(record.area > 0) || visibility == ShapeVisibility::kNoRays) continue;
     geometry.shape = kind.shape(record);
     if (geometry.shape == LightShape::kNone) continue;
+    geometry.delta_bounces_only = visibility == ShapeVisibility::kDeltaBounces;
+    if (geometry.delta_bounces_only) geometry.shape = LightShape::kCustom;
     geometry.kind = &kind;
     geometry.light.kind = record.kind;
     geometry.light.radius = record.radius;

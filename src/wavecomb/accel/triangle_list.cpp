@@ -119,7 +119,7 @@ struct ListTracer {
   /// only rays that pass near the shape's bounding sphere.
   template <typename F>
   F intersect_shape(const TriangleList::Shape& shape, const Packet<F>& packet, const F& limit,
-                    const Mask<F>& active) const {
+                    const Mask<F>& active, size_t base) const {
     const Vec3<F> to(Vec3<float>{shape.centre[0], shape.centre[1], shape.centre[2]});
     const Vec3<F> p = to - packet.o;
     const F along = dot(p, packet.d), distance2 = length_squared(p);
@@ -130,6 +130,8 @@ struct ListTracer {
     std::array<float, kWidth<F>> t{};
     for (uint32_t bits = lane_bits<F>(near); bits != 0; bits &= bits - 1) {
       const auto i = static_cast<size_t>(std::countr_zero(bits));
+      const auto ray = static_cast<uint32_t>(base + i);
+      if (!is_hit_by(shape.light_geometry, keys, rays.slot ? rays.slot[ray] : ray)) continue;
       const float o[3] = {lane(packet.o.x, i), lane(packet.o.y, i), lane(packet.o.z, i)};
       const float d[3] = {lane(packet.d.x, i), lane(packet.d.y, i), lane(packet.d.z, i)};
       t[i] = intersect_custom_shape(shape.light_geometry, o, d, 0.f);
@@ -170,7 +172,7 @@ struct ListTracer {
         entry = select(Mask<U>(take), U(i), entry);
       }
       for (uint32_t i = 0; i < shapes && !keys.object; ++i) {
-        const F distance = intersect_shape(list.shapes_[i], packet, t, active);
+        const F distance = intersect_shape(list.shapes_[i], packet, t, active, base);
         const Mask<F> take = distance > 0.f;
         t = select(take, distance, t);
         b = select(take, F(0.f), b);
@@ -208,7 +210,7 @@ struct ListTracer {
         open = open & not_(take);
       }
       for (const TriangleList::Shape& shape : list.shapes_)
-        open = open & not_(intersect_shape(shape, packet, tfar, open) > 0.f);
+        open = open & not_(intersect_shape(shape, packet, tfar, open, base) > 0.f);
       store_first(out + base, U(select(Mask<U>(open), U(0u), U(1u))), rays.size - base);
     }
   }

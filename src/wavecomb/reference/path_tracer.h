@@ -93,7 +93,8 @@ class PathTracer : PathRecorder {
       path.time = time;
       clock_.enter(Phase::kTrace);
       const F tfar = depth == 0 && context_.camera->has_far ? ray.tfar : kInfinity;
-      SingleHit hit = rays_.intersect(path.o, path.dir, tfar, depth);
+      SingleHit hit =
+          rays_.intersect(path.o, path.dir, tfar, depth, depth > 0 ? &path.pdf : nullptr);
       clock_.enter(Phase::kShade);
       bool left_body = false;
       if (path.enters_body) {

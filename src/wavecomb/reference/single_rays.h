@@ -34,10 +34,13 @@ class SingleRays {
   /// Returns the presence keys of the last ray.
   const PresenceKeys& keys() const { return keys_; }
 
-  SingleHit intersect(const Vec3<float>& o, const Vec3<float>& d, float tfar, uint32_t depth) {
+  /// Traces a ray. `bounce_pdf` is PresenceKeys::bounce_pdf and must outlive keys().
+  SingleHit intersect(const Vec3<float>& o, const Vec3<float>& d, float tfar, uint32_t depth,
+                      const float* bounce_pdf = nullptr) {
     SingleHit h;
     keys_.salt = 2 * depth;
     keys_.ray_kind = ray_kind(depth, false);
+    keys_.bounce_pdf = bounce_pdf;
     keys_.shadow_set = nullptr;
     context_.accel->intersect(span(o, d, tfar), {&h.t, &h.u, &h.v, &h.prim, &h.geom, &h.inst}, 1,
                               false, keys_);
@@ -52,6 +55,7 @@ class SingleRays {
     uint32_t blocked = 0;
     keys_.salt = 2 * depth + 1;
     keys_.ray_kind = ray_kind(depth, true);
+    keys_.bounce_pdf = nullptr;
     keys_.shadow_set = shadow_set;
     context_.accel->occluded(span(o, d, tfar), &blocked, 1, false, keys_);
     counts_.add_shadow_rays(depth, 1);

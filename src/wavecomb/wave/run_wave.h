@@ -37,6 +37,9 @@ struct CameraPaths {
   /// start at the same point. For such rays, coherent packets find the same hits as single rays.
   /// For rays from several points, hits at edges may differ (canonical-hits.md).
   static bool are_coherent(const WaveContext& context) { return context.camera->is_pinhole(); }
+  static PresenceKeys keys(const PathPool& pool, uint32_t depth) {
+    return presence_keys(pool, depth, false);
+  }
   static ShadeSettings settings(const WaveContext& context) {
     return ShadeSettings(*context.settings);
   }
@@ -91,7 +94,7 @@ void run_stages(Wave& wave, const WaveContext& context, const WaveTask& task, Pa
     }
     Clock::time_point start = Clock::now();
     trace(wave, context, depth, depth == 0 ? paths.tfar : nullptr, fetch_times<F>(wave, wave.rays),
-          depth == 0 && paths.are_coherent(context));
+          depth == 0 && paths.are_coherent(context), paths.keys(wave.pool, depth));
     learn_order(wave.ray_chooser, depth, ray_order, start);
 
     clock.enter(Phase::kShade);

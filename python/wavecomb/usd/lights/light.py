@@ -37,6 +37,7 @@ from wavecomb.usd.materials.pixels import Image
 from wavecomb.usd.materials.texture import TextureTable
 from wavecomb.usd.stage.collections import Collections, LightGroups, Rules
 from wavecomb.usd.stage.context import LoadContext
+from wavecomb.usd.stage.ray_visibility import inherited_rays
 
 KINDS = kind_of_prims()
 """Kinds of supported lights, by prim type."""
@@ -139,10 +140,21 @@ class LightReader:
                 options["portals"] = portals
             normalize = False
         options["normalize"] = normalize
-        hidden = self.hidden or prim.GetAttribute("wavecomb:visible").Get(self.time) is False
-        if hidden and kind in light_parameters()["visible"].kinds:
-            options["visible"] = False
+        options.update(self._visibility(prim, kind))
         return Light(kind, options, local, self.filters.of(prim, kind))
+
+    def _visibility(self, prim: Usd.Prim, kind: str) -> dict[str, bool]:
+        """Returns which rays hit the light's shape; empty for lights without a shape."""
+        if kind not in light_parameters()["visible_to_camera"].kinds:
+            return {}
+        rays = inherited_rays(prim)
+        by_camera, by_bounces = rays.get("camera", True), rays.get("bounces", True)
+        seen = prim.GetAttribute("wavecomb:visible").Get(self.time) is not False
+        if self.hidden or not seen or not (by_camera or by_bounces):
+            return {"visible": False}
+        if not by_bounces:
+            self.report.missing("lights hidden from bounces only", prim.GetPath())
+        return {} if by_camera else {"visible_to_camera": False}
 
     def read_mesh(self, prim: Usd.Prim) -> dict[str, Any]:
         """Reads a mesh light as keyword arguments of ``SceneBuilder.add_mesh_light``."""

@@ -251,7 +251,7 @@ def light_values(prim: Usd.Prim, time: Usd.TimeCode) -> dict[str, Any] | None:
     return {
         row.name: light.options.get(row.name, row.default)
         for row in of_kind(light.kind)
-        if row.kind in EDITABLE and row.name != "visible"
+        if row.kind in EDITABLE and row.name not in ("visible", "visible_to_camera")
     }
 
 

@@ -12,6 +12,7 @@ from wavecomb import _core
 from wavecomb.errors import WavecombError
 from wavecomb.load_options import LoadOptions
 from wavecomb.usd.stage.context import LoadContext
+from wavecomb.usd.stage.report import LoadReport
 
 _FLAGS = {
     "primvars:wavecomb:visibility:camera": "camera",
@@ -41,6 +42,7 @@ _KARMA_KINDS = {
     "reflect": "bounces",
     "refract": "bounces",
 }
+_BY_KIND = "visibility by kinds of bounces"
 _CATCHER = "primvars:wavecomb:catcher"
 NAMES = frozenset({*_FLAGS, *_ARNOLD_BOUNCES, _KARMA, _CATCHER})
 """Names of all attributes that this module reads."""
@@ -61,45 +63,71 @@ class RayVisibility:
 
     def read(self, prim: Usd.Prim) -> None:
         """Reads the visibility of a prim that authors at least one of ``NAMES``."""
-        rays = {
-            kind: bool(value)
-            for name, kind in _FLAGS.items()
-            if (value := prim.GetAttribute(name).Get()) is not None
-        }
-        bounces = [
-            value
-            for name in _ARNOLD_BOUNCES
-            if (value := prim.GetAttribute(name).Get()) is not None
-        ]
-        if bounces:
-            whole = len(bounces) == len(_ARNOLD_BOUNCES) and not any(bounces)
-            if not whole and not all(bounces):
-                self._report.missing("visibility by kinds of bounces", prim.GetPath())
-            rays["bounces"] = not whole
-        mask = prim.GetAttribute(_KARMA).Get()
-        if mask is not None:
-            rays |= self._karma(str(mask), prim)
+        rays = rays_of(prim, self._report)
         rays = {kind: seen for kind, seen in rays.items() if kind not in self._ignored}
         if prim.GetAttribute(_CATCHER).Get():
             self.catchers.append(self._report.place(str(prim.GetPath())))
         if rays:
             self._builder.add_visibility(self._report.place(str(prim.GetPath())), rays)
 
-    def _karma(self, mask: str, prim: Usd.Prim) -> dict[str, bool]:
-        """Parses a visibility mask of Karma, such as "primary|shadow", "-primary" or "*"."""
-        words = [word for word in re.split(r"[|&,\s]+|(?=-)", mask) if word]
-        left_out = bool(words) and all(word.startswith("-") for word in words)
-        kinds = {word.removeprefix("-") for word in words}
-        if "*" in kinds:
-            kinds = set(_KARMA_KINDS)
-        if not kinds <= _KARMA_KINDS.keys():
-            self._report.missing(f"visibility {mask!r}", prim.GetPath())
-            return {}
-        seen = {kind: (kind in kinds) != left_out for kind in _KARMA_KINDS}
-        bounces = [seen[kind] for kind, ours in _KARMA_KINDS.items() if ours == "bounces"]
-        if any(bounces) and not all(bounces):
-            self._report.missing("visibility by kinds of bounces", prim.GetPath())
-        return {"camera": seen["primary"], "shadow": seen["shadow"], "bounces": any(bounces)}
+
+def rays_of(prim: Usd.Prim, report: LoadReport | None = None) -> dict[str, bool]:
+    """Returns the visibility for kinds of rays that a prim authors.
+
+    Keys are "camera", "shadow", "bounces" and "holdout". The report, if given, receives what is not
+    supported.
+    """
+    rays = {
+        kind: bool(value)
+        for name, kind in _FLAGS.items()
+        if (value := prim.GetAttribute(name).Get()) is not None
+    }
+    missing: list[str] = []
+    bounces = [
+        value for name in _ARNOLD_BOUNCES if (value := prim.GetAttribute(name).Get()) is not None
+    ]
+    if bounces:
+        whole = len(bounces) == len(_ARNOLD_BOUNCES) and not any(bounces)
+        if not whole and not all(bounces):
+            missing.append(_BY_KIND)
+        rays["bounces"] = not whole
+    mask = prim.GetAttribute(_KARMA).Get()
+    if mask is not None:
+        rays |= _karma(str(mask), missing)
+    if report is not None:
+        for what in missing:
+            report.missing(what, prim.GetPath())
+    return rays
+
+
+def inherited_rays(prim: Usd.Prim) -> dict[str, bool]:
+    """Returns what ``rays_of`` finds on a prim and, where the prim says nothing, above it."""
+    rays: dict[str, bool] = {}
+    while prim and not prim.IsPseudoRoot():
+        if not NAMES.isdisjoint(prim.GetAuthoredPropertyNames()):
+            rays = rays_of(prim) | rays
+        prim = prim.GetParent()
+    return rays
+
+
+def _karma(mask: str, missing: list[str]) -> dict[str, bool]:
+    """Parses a visibility mask of Karma, such as "primary|shadow", "-primary" or "*".
+
+    Adds what is not supported to ``missing``.
+    """
+    words = [word for word in re.split(r"[|&,\s]+|(?=-)", mask) if word]
+    left_out = bool(words) and all(word.startswith("-") for word in words)
+    kinds = {word.removeprefix("-") for word in words}
+    if "*" in kinds:
+        kinds = set(_KARMA_KINDS)
+    if not kinds <= _KARMA_KINDS.keys():
+        missing.append(f"visibility {mask!r}")
+        return {}
+    seen = {kind: (kind in kinds) != left_out for kind in _KARMA_KINDS}
+    bounces = [seen[kind] for kind, ours in _KARMA_KINDS.items() if ours == "bounces"]
+    if any(bounces) and not all(bounces):
+        missing.append(_BY_KIND)
+    return {"camera": seen["primary"], "shadow": seen["shadow"], "bounces": any(bounces)}
 
 
 IGNORED = {

@@ -141,6 +141,9 @@ struct Light {
   /// Id that SceneBuilder::add_light_filter() returned; ignored for infinite lights.
   uint32_t filter = kNoFilter;
   bool visible = true;  ///< whether camera and bounce rays can hit the light's shape
+  /// Whether camera rays can hit the light's shape. If not, the shape is hit only by rays that
+  /// mirrors and clear glass reflect or transmit, and it blocks no other rays.
+  bool visible_to_camera = true;
   /// Portals of a dome light: transforms from the unit square in the xy plane to the openings
   /// through which the dome is sampled. The -z side of a portal receives the light.
   std::vector<Affine> portals;

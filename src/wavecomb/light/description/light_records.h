@@ -14,6 +14,14 @@ struct LightAim;
 struct MeshRecord;
 struct InstanceRecord;
 
+/// Which rays can hit the shape of a light.
+enum class ShapeVisibility : uint32_t {
+  kAllRays,
+  kNoRays,
+  /// Rays that start with a delta bounce, which light samples cannot replace.
+  kDeltaBounces,
+};
+
 /// Packed light other than an emissive triangle, in 192 bytes. Vectors are in world space. Use of
 /// the members by kind:
 ///   rect      p corner, u, v edges, their lengths and inverses, n unit normal (direction of
@@ -40,11 +48,11 @@ struct alignas(64) LightRecord {
   uint32_t distribution;
   uint32_t shaping;  ///< index into LightView::shapings, or kNoShaping
   float diffuse, specular;
-  /// Nonzero for lights that only light samples find, such as lights whose shape rays cannot hit or
-  /// whose shadows bounce rays cannot reproduce. Light samples of these lights have MIS weight 1,
-  /// and bounces that hit them contribute nothing, except delta bounces.
+  /// Nonzero for lights that only light samples find, such as lights whose shape not all rays can
+  /// hit, or whose shadows bounce rays cannot reproduce. Light samples of these lights have MIS
+  /// weight 1, and bounces that hit them contribute nothing, except delta bounces.
   uint32_t sampled_only;
-  uint32_t hidden;  ///< 1 means that rays cannot hit the shape of the light
+  uint32_t visibility;  ///< ShapeVisibility of the light's shape
   uint32_t light_link, shadow_link;
   uint32_t sync;     ///< MaterialSync of a mesh light
   uint32_t portals;  ///< portals of a dome: index into LightView::portal_groups, or kNoPortals

@@ -260,6 +260,11 @@ std::vector<LightParameter> other_rows() {
       with(kVisibleShape, kShape,
            row<&L::visible>("visible", "visible", "",
                             "Whether camera and bounce rays can hit the light's shape.")),
+      with(kOwnShape, kShape,
+           row<&L::visible_to_camera>(
+               "visible_to_camera", "visible to camera", "",
+               "Whether the camera sees the light's shape; if not, only mirrors and clear glass "
+               "show it, and it blocks no other light.")),
       with(kHasTransform, kShape,
            row<&L::motion>("motion", "motion", "",
                            "Transforms of a moving light at k >= 2 equally spaced shutter times, "

@@ -43,6 +43,8 @@ inline constexpr uint32_t kInfinite = 32;
 inline constexpr uint32_t kFiltered = 64;  ///< supports light filters
 /// The light's radiance is the background in light path expressions.
 inline constexpr uint32_t kBackground = 128;
+/// Rays can hit the light's shape, which is not a mesh of the scene.
+inline constexpr uint32_t kOwnShape = 256;
 }  // namespace light_trait
 
 /// Description of a light parameter. Contract: a description exists as long as the program runs.

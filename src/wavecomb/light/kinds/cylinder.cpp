@@ -77,7 +77,7 @@ LightKindInfo CylinderKind::describe() {
   LightKindInfo kind;
   kind.name = "cylinder";
   kind.prims = {"CylinderLight"};
-  kind.traits = kHasTransform | kSized | kShaped | kVisibleShape | kFiltered;
+  kind.traits = kHasTransform | kSized | kShaped | kVisibleShape | kOwnShape | kFiltered;
   kind.parameters = {"radius", "length"};
   kind.make = &make;
   kind.bound = &bound;

@@ -56,7 +56,7 @@ LightKindInfo DiskKind::describe() {
   LightKindInfo kind;
   kind.name = "disk";
   kind.prims = {"DiskLight"};
-  kind.traits = kHasTransform | kSized | kShaped | kVisibleShape | kFiltered;
+  kind.traits = kHasTransform | kSized | kShaped | kVisibleShape | kOwnShape | kFiltered;
   kind.parameters = {"radius"};
   kind.make = &make;
   kind.bound = &bound;

@@ -27,6 +27,14 @@ bool fades(std::span<const LightFilter> filters, uint32_t filter) {
   return false;
 }
 
+ShapeVisibility shape_visibility(const Light& light, const LightKindInfo& kind) {
+  if (kind.has(light_trait::kInfinite)) return ShapeVisibility::kAllRays;
+  if (!light.visible) return ShapeVisibility::kNoRays;
+  if (!light.visible_to_camera && kind.has(light_trait::kOwnShape))
+    return ShapeVisibility::kDeltaBounces;
+  return ShapeVisibility::kAllRays;
+}
+
 }  // namespace
 
 LightBuild make_light(const Light& light, LightBuildContext& context) {
@@ -40,7 +48,8 @@ LightBuild make_light(const Light& light, LightBuildContext& context) {
   r.distribution = kNoDistribution;
   r.diffuse = std::max(0.f, light.diffuse);
   r.specular = std::max(0.f, light.specular);
-  r.hidden = !light.visible && !kind.has(light_trait::kInfinite);
+  const ShapeVisibility visibility = shape_visibility(light, kind);
+  r.visibility = static_cast<uint32_t>(visibility);
   r.light_link = light.light_link;
   r.shadow_link = light.shadow_link;
   r.shadow = kPlainShadow;
@@ -49,7 +58,8 @@ LightBuild make_light(const Light& light, LightBuildContext& context) {
     context.set.shadows.push_back(record_builder::make_shadow(light.shadow));
   }
   r.filter = kind.has(light_trait::kFiltered) ? light.filter : kNoFilter;
-  r.sampled_only = r.hidden != 0 || r.shadow_link != kNoSet || r.shadow != kPlainShadow;
+  r.sampled_only = visibility != ShapeVisibility::kAllRays || r.shadow_link != kNoSet ||
+                   r.shadow != kPlainShadow;
   r.camera_only = r.sampled_only != 0 || r.diffuse != 1 || r.specular != 1 ||
                   r.light_link != kNoSet || light.moves() || fades(context.filters, r.filter);
   if (kind.make) kind.make(out, light, context);

@@ -53,7 +53,8 @@ LightKindInfo RectKind::describe() {
   LightKindInfo kind;
   kind.name = "rect";
   kind.prims = {"RectLight"};
-  kind.traits = kHasTransform | kSized | kShaped | kVisibleShape | kTextured | kFiltered;
+  kind.traits =
+      kHasTransform | kSized | kShaped | kVisibleShape | kOwnShape | kTextured | kFiltered;
   kind.parameters = {"width", "height"};
   kind.make = &make;
   kind.bound = &bound;

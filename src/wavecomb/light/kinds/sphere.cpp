@@ -62,7 +62,7 @@ LightKindInfo SphereKind::describe() {
   LightKindInfo kind;
   kind.name = "sphere";
   kind.prims = {"SphereLight"};
-  kind.traits = kHasTransform | kSized | kShaped | kVisibleShape | kFiltered;
+  kind.traits = kHasTransform | kSized | kShaped | kVisibleShape | kOwnShape | kFiltered;
   kind.parameters = {"radius"};
   kind.make = &make;
   kind.bound = &bound;

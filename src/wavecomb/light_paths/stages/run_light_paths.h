@@ -22,6 +22,12 @@ struct LightPathStages {
     fetch_rays<F>(wave);
   }
   static bool are_coherent(const WaveContext& /*context*/) { return false; }
+  /// Light paths pass through lights that the camera does not see.
+  static PresenceKeys keys(const PathPool& pool, uint32_t depth) {
+    PresenceKeys keys = presence_keys(pool, depth, false);
+    keys.bounce_pdf = nullptr;
+    return keys;
+  }
   static ShadeSettings settings(const WaveContext& context) {
     return light_shade_settings(*context.settings);
   }

@@ -279,6 +279,7 @@ inline void NestedMedia::attenuate(const NestedRays& rays, const float* most,
   // Rays also enter and leave boundaries of media without attenuation.
   const PresenceKeys requested = keys;
   keys.ray_kind = kVisibleToAll;
+  keys.bounce_pdf = nullptr;
   keys.shadow_set = nullptr;
   size_t left = 0;
   for (size_t i = 0; i < rays.size; i += kWidth<F>) {
@@ -317,6 +318,7 @@ inline void NestedMedia::attenuate(const NestedRays& rays, const float* most,
 inline MediumStack<float> NestedMedia::stack_at(Vec3<float> p, float time,
                                                 PresenceKeys keys) const {
   keys.ray_kind = kVisibleToAll;
+  keys.bounce_pdf = nullptr;
   MediumBoundary<float> left[kMaxMediumStack];
   size_t count = 0;
   MediumStack<float> entered;

@@ -57,6 +57,7 @@ inline PresenceKeys presence_keys(const PathPool& pool, uint32_t depth, bool sha
   PresenceKeys keys{&path->key.pixel_hash, &path->key.sample, kRowWords<PathRow>,
                     2 * depth + (shadow ? 1u : 0u)};
   keys.ray_kind = ray_kind(depth, shadow);
+  if (!shadow && depth > 0) keys.bounce_pdf = &path->pdf;
   if (uses_linking) {
     keys.shadow_set = &reinterpret_cast<const ShadowRow<float>*>(pool.shadows)->set;
     keys.shadow_stride = kRowWords<ShadowRow>;
@@ -65,16 +66,16 @@ inline PresenceKeys presence_keys(const PathPool& pool, uint32_t depth, bool sha
 }
 
 /// Traces the ray queue and stores the closest hits in the hit buffer. `times` is the result of
-/// fetch_times().
+/// fetch_times(), and `keys` that of presence_keys().
 inline void trace(Wave& wave, const WaveContext& context, uint32_t depth, const float* tfar,
-                  const float* times, bool coherent) {
+                  const float* times, bool coherent, const PresenceKeys& keys) {
   const RayQueue& q = wave.rays;
   const RaySpan rays{q.ox, q.oy, q.oz, q.dx, q.dy, q.dz, tfar, q.slot, q.size, times};
   if (context.recorder) context.recorder->closest(&wave, rays, depth, coherent);
   const HitBuffer& h = wave.hits;
   const auto start = wave.aovs.start_time();
   context.accel->intersect(rays, {h.t, h.u, h.v, h.prim, h.geom, h.inst}, context.traversal_width,
-                           coherent, presence_keys(wave.pool, depth, false));
+                           coherent, keys);
   const auto slot_of = [&](size_t i) { return q.slot[i]; };
   wave.aovs.charge_rays(q.size, slot_of);
   wave.aovs.spread_time(q.size, start, slot_of);
