@@ -7,13 +7,14 @@
 #include <vector>
 
 #include "chi_square.h"
+#include "numbers_testing.h"
 #include "wavecomb/material/bsdf.h"
 #include "wavecomb/material/energy_tables.h"
 #include "wavecomb/material/openpbr_params.h"
 
 namespace wavecomb::bsdf_testing {
 
-inline constexpr double kPiD = 3.14159265358979323846;
+using numbers_testing::kPiD;
 
 inline Vec3<float> direction(double cos_theta, double phi) {
   const double r = std::sqrt(std::max(0.0, 1 - cos_theta * cos_theta));

@@ -10,13 +10,14 @@
 #include <random>
 #include <vector>
 
+#include "numbers_testing.h"
 #include "wavecomb/core/lanes/lanes.h"
 #include "wavecomb/core/vec.h"
 
 namespace wavecomb::lane_testing {
 
-inline constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-inline constexpr float kInf = std::numeric_limits<float>::infinity();
+using numbers_testing::kInf;
+using numbers_testing::kNan;
 
 /// Calls f.operator()<F>() for each packet type with kernels in this build: the widest type in
 /// `make test`, and all widths in `make test-long`.

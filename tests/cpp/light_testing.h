@@ -4,13 +4,16 @@
 
 #include <optional>
 
+#include "numbers_testing.h"
 #include "wavecomb/light/description/light_builder.h"
 #include "wavecomb/light/sampling/escape.h"
 #include "wavecomb/light/sampling/light_sample.h"
 
 namespace wavecomb::light_testing {
 
-inline constexpr double kPiD = 3.14159265358979323846;
+using numbers_testing::kPiD;
+using numbers_testing::scale;
+using numbers_testing::translate;
 
 /// A light set with its textures.
 struct Lights {
@@ -61,14 +64,6 @@ inline Light make_light(LightKind kind, const Affine& to_world = {}) {
   light.to_world = to_world;
   light.color = {2, 3, 4};
   return light;
-}
-inline Affine translate(float x, float y, float z) {
-  Affine a;
-  a.t = {x, y, z};
-  return a;
-}
-inline Affine scale(float x, float y, float z) {
-  return {{{x, 0, 0}, {0, y, 0}, {0, 0, z}}, {0, 0, 0}};
 }
 /// Rotates by `degrees` about the x axis, then about the y axis.
 inline Affine rotate(double x_degrees, double y_degrees) {

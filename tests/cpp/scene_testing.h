@@ -15,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "numbers_testing.h"
 #include "wavecomb/core/error.h"
 #include "wavecomb/light/kinds/kinds.h"
 #include "wavecomb/render/renderer.h"
@@ -34,20 +35,14 @@ inline constexpr uint32_t size_for_build(uint32_t n, uint32_t divisor = 8) {
   return kSanitized ? std::max(1u, n / divisor) : n;
 }
 
-inline constexpr double kPiD = 3.14159265358979323846;
-inline constexpr float kInf = std::numeric_limits<float>::infinity();
-inline constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+using numbers_testing::kInf;
+using numbers_testing::kNan;
+using numbers_testing::kPiD;
+using numbers_testing::scale;
+using numbers_testing::translate;
 
 // ---- transforms -------------------------------------------------------------------------------
 
-inline Affine translate(float x, float y, float z) {
-  Affine a;
-  a.t = {x, y, z};
-  return a;
-}
-inline Affine scale(float x, float y, float z) {
-  return {{{x, 0, 0}, {0, y, 0}, {0, 0, z}}, {0, 0, 0}};
-}
 /// Rotates by `degrees` about x (0), y (1) or z (2).
 inline Affine rotate(int axis, double degrees) {
   const auto c = static_cast<float>(std::cos(degrees * kPiD / 180));

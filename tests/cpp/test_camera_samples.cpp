@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "chi_square.h"
+#include "numbers_testing.h"
 #include "parts.h"
 #include "wavecomb/core/frame.h"
 #include "wavecomb/film/film.h"
@@ -21,8 +22,8 @@ using chi_square::Draw;
 using chi_square::Place;
 using chi_square::Random;
 
-constexpr double kPiD = 3.14159265358979323846;
-constexpr uint32_t kWidth = 8, kHeight = 6;
+using numbers_testing::kPiD;
+constexpr uint32_t kImageWidth = 8, kImageHeight = 6;
 constexpr float kX = 5, kY = 2;  ///< the pixel
 
 /// Unnormalised filter at x in [-1, 1], as documented at Settings.
@@ -116,7 +117,8 @@ TEST(CameraSamples, FollowThePixelFilter) {
   for (const CameraCase& seen : kCameras)
     for (const FilterCase& filter : kFilters) {
       const FilterTable table(filter.kind, filter.width);
-      const CameraSetup setup(make_camera(seen.projection, seen.lens), kWidth, kHeight, table);
+      const CameraSetup setup(make_camera(seen.projection, seen.lens), kImageWidth, kImageHeight,
+                              table);
       const double half = 0.5 * double{filter.width};
       const auto density = filter_density(filter.kind, double{filter.width});
       battery.run({std::string(filter.name) + ", " + seen.name,
@@ -138,7 +140,7 @@ TEST(CameraSamples, FillTheLensEvenly) {
   const auto density = filter_density(FilterKind::kGaussian, 3);
   for (const Projection projection : {Projection::kPerspective, Projection::kOrthographic})
     for (const float radius : {0.001f, 0.3f, 5.f}) {
-      const CameraSetup setup(make_camera(projection, radius), kWidth, kHeight, table);
+      const CameraSetup setup(make_camera(projection, radius), kImageWidth, kImageHeight, table);
       const std::string name =
           (projection == Projection::kPerspective ? "lens of " : "orthographic lens of ") +
           std::to_string(radius);
@@ -176,9 +178,10 @@ TEST(CameraConnections, AreTheWayBack) {
     made.to_world.row[1] = {0.9f, 0.8f, -0.2f};
     made.to_world.row[2] = {0.1f, 0.4f, 1.3f};
     made.to_world.t = {2, -1, 0.5f};
-    const CameraSetup setup(made, kWidth, kHeight, table);
+    const CameraSetup setup(made, kImageWidth, kImageHeight, table);
     for (int i = 0; i < 200; ++i) {
-      const float u = random(), v = random(), x = kWidth * random(), y = kHeight * random();
+      const float u = random(), v = random(), x = kImageWidth * random(),
+                  y = kImageHeight * random();
       const float t = 1.f + 8.f * random();
       const CameraRay<float> ray = ray_through<float>(setup, x, y, u, v, 0.f, true);
       const Vec3<float> p = fma(ray.d, t, ray.o);

@@ -5,6 +5,7 @@
 #include <functional>
 #include <random>
 
+#include "numbers_testing.h"
 #include "wavecomb/film/film.h"
 #include "wavecomb/film/filter.h"
 #include "wavecomb/path/camera/camera_ray.h"
@@ -12,7 +13,7 @@
 namespace wavecomb {
 namespace {
 
-constexpr double kPiD = 3.14159265358979323846;
+using numbers_testing::kPiD;
 
 struct FilterCase {
   FilterKind kind;

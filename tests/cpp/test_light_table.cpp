@@ -19,8 +19,8 @@ namespace {
 
 using scene_testing::make_light;
 
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-constexpr float kInf = std::numeric_limits<float>::infinity();
+using scene_testing::kInf;
+using scene_testing::kNan;
 constexpr LightReferences kThere{2, 2, 2, 2};
 
 Light a_light(LightKind kind = LightKind::kRect) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Tests of core/math.h: errors compared with double precision, in units in the last place, and
 /// equal results of packets and scalars.
+#include "numbers_testing.h"
 #include "wavecomb/core/math.h"
 
 #include <functional>
@@ -13,7 +14,7 @@ namespace {
 
 using namespace lane_testing;
 
-constexpr double kPiD = 3.14159265358979323846;
+using numbers_testing::kPiD;
 
 /// Returns floats in [lo, hi], including both ends: some uniformly distributed, and some at all
 /// orders of magnitude.

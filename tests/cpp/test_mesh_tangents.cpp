@@ -35,7 +35,7 @@ ScenePtr one_mesh(const MeshData& data, const Material& material, const Affine& 
 Surface<float> surface_at(const Scene& scene, uint32_t prim, float u, float v) {
   return setup_surface<float>(scene.view(), {1, 0, prim, u, v}, {0, -1, 0}, true, false, true);
 }
-V unit(const V& v) {
+V normalized(const V& v) {
   return v * (1 / length(v));
 }
 /// Returns the tangent in the plane of the shading normal, as shading frames use it.
@@ -43,7 +43,7 @@ V grain(const Surface<float>& s) {
   return make_frame<float>(s.ns, s.dpdu, s.handedness).s;
 }
 double degrees_between(const V& a, const V& b) {
-  return std::acos(std::clamp(double{dot(unit(a), unit(b))}, -1.0, 1.0)) * 180 / kPiD;
+  return std::acos(std::clamp(double{dot(normalized(a), normalized(b))}, -1.0, 1.0)) * 180 / kPiD;
 }
 
 /// Whether a triangle of sphere() touches a pole or the seam, where tangents are one-sided.
@@ -69,7 +69,7 @@ TEST(Directions, ComeBackFromTheirCodes) {
       continue;
     }
     ASSERT_NEAR(length(back), 1, 1e-6);
-    ASSERT_LT(length(back - unit(v)), 7e-5f) << v.x << " " << v.y << " " << v.z;
+    ASSERT_LT(length(back - normalized(v)), 7e-5f) << v.x << " " << v.y << " " << v.z;
   }
   EXPECT_EQ(encode_direction({kNan, 1, 0}), kNoDirection);
   EXPECT_EQ(encode_direction({kInf, 1, 0}), kNoDirection);
@@ -223,8 +223,8 @@ TEST(Tangents, FramesAreTurnedAsTheTextureIs) {
           // v increases towards the top of the sphere.
           const V up = place.vector(V(0, 1, 0));
           const Frame<float> f = make_frame<float>(s.ns, s.dpdu, s.handedness);
-          const V v = unit(up - s.ns * dot(s.ns, up));
-          if (std::abs(dot(unit(up), s.ns)) > 0.8f) continue;
+          const V v = normalized(up - s.ns * dot(s.ns, up));
+          if (std::abs(dot(normalized(up), s.ns)) > 0.8f) continue;
           ASSERT_GT(dot(f.t, v), 0.5f) << prim;
         }
       }

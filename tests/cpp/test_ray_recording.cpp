@@ -11,7 +11,7 @@ using namespace scene_testing;
 constexpr uint64_t kPlenty = 1u << 30;
 constexpr std::array<bool, kRayKinds> kAll{true, true, true};
 
-Settings small_settings() {
+Settings recorded_settings() {
   Settings s;
   s.width = size_for_build(48, 3);
   s.height = size_for_build(40, 3);
@@ -23,7 +23,7 @@ Settings small_settings() {
 TEST(RayRecording, KeepsEveryRayAndChangesNothing) {
   const ScenePtr scene = mixed();
   WavefrontRenderer renderer(scene, 2);
-  const Settings settings = small_settings();
+  const Settings settings = recorded_settings();
   const RenderedImage plain = renderer.render(settings);
   RayRecording recording(scene, kPlenty);
   const RenderedImage recorded = renderer.render(settings, {.recorder = &recording});
@@ -42,7 +42,7 @@ TEST(RayRecording, EmbreeAloneHitsWhatARenderHits) {
   const ScenePtr scene = mixed();
   WavefrontRenderer renderer(scene, 2);
   RayRecording recording(scene, kPlenty);
-  renderer.render(small_settings(), {.recorder = &recording});
+  renderer.render(recorded_settings(), {.recorder = &recording});
   const RenderStatistics& s = renderer.statistics();
 
   const ReplayTimes expected = recording.replay({false, 1, {1, 1, 1}, {}, kAll});
@@ -74,7 +74,7 @@ TEST(RayRecording, StopsAtItsLimit) {
   WavefrontRenderer renderer(scene, 2);
   RayRecording recording(scene, 4096);
   try {
-    renderer.render(small_settings(), {.recorder = &recording});
+    renderer.render(recorded_settings(), {.recorder = &recording});
     FAIL() << "recorded " << recording.bytes() << " bytes";
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find("fewer samples"), std::string::npos) << error.what();

@@ -54,7 +54,7 @@ class AbsurdField {
   GuidingView view_;
 };
 
-Settings small_settings() {
+Settings survival_settings() {
   Settings s;
   s.width = size_for_build(29, 4);
   s.height = size_for_build(23, 4);
@@ -69,7 +69,7 @@ TEST(Survival, IsOnePictureForAllSchedules) {
   for (const ScenePtr& scene : {cornell(), mixed(), emissive_meshes(), presence()}) {
     const auto accel = std::make_shared<const EmbreeAccelerator>(scene, 1u);
     const AbsurdField absurd(*scene, 7);
-    Settings s = small_settings();
+    Settings s = survival_settings();
     WaveRun reference(scene, {s, kReferenceLanes, 1}, accel);
     reference.guide(absurd.view());
     reference.all(64);
@@ -97,7 +97,7 @@ TEST(Survival, IsOnePictureForAllSchedules) {
 TEST(Survival, HasTheSameMeanForAbsurdCostsAndFields) {
   for (const ScenePtr& scene : {cornell(), mixed()}) {
     const auto accel = std::make_shared<const EmbreeAccelerator>(scene, 1u);
-    Settings s = small_settings();
+    Settings s = survival_settings();
     s.aovs = {};
     s.width = s.height = 16;
     s.spp = 16;

@@ -48,7 +48,7 @@ void expect_one_image(const ScenePtr& scene, Settings settings) {
         }
 }
 
-Settings small_settings() {
+Settings wave_settings() {
   Settings s;
   s.width = size_for_build(37, 3);
   s.height = size_for_build(29, 3);
@@ -58,16 +58,16 @@ Settings small_settings() {
 }
 
 TEST(Wave, DiffuseBoxIsOnePicture) {
-  expect_one_image(cornell(), small_settings());
+  expect_one_image(cornell(), wave_settings());
 }
 TEST(Wave, AllProgramsAreOnePicture) {
-  expect_one_image(mixed(), small_settings());
+  expect_one_image(mixed(), wave_settings());
 }
 TEST(Wave, EmissiveMeshesAreOnePicture) {
-  expect_one_image(emissive_meshes(), small_settings());
+  expect_one_image(emissive_meshes(), wave_settings());
 }
 TEST(Wave, LightsByTreeAreOnePicture) {
-  Settings s = small_settings();
+  Settings s = wave_settings();
   s.light_selection = LightSelection::kTree;
   s.width = s.height = 19;
   for (const ScenePtr& scene : {cornell(), mixed(), emissive_meshes()}) expect_one_image(scene, s);
@@ -95,7 +95,7 @@ ScenePtr under_point_lights() {
 // A light sample includes its selection probability, so MIS need not descend the light tree again.
 // Bounces do not hit point lights, so wrong trails must not change the image.
 TEST(Wave, LightSamplesDescendTheTreeOnce) {
-  Settings s = small_settings();
+  Settings s = wave_settings();
   s.light_selection = LightSelection::kTree;
   const ScenePtr scene = under_point_lights();
   const std::vector<uint32_t> none(scene->view().lights.count, kNoLight);
@@ -113,7 +113,7 @@ TEST(Wave, LightSamplesDescendTheTreeOnce) {
 
 // Verifies that the previous test can fail: with lights that bounces hit, trails affect the image.
 TEST(Wave, LightsThatBouncesHitNeedTrails) {
-  Settings s = small_settings();
+  Settings s = wave_settings();
   s.light_selection = LightSelection::kTree;
   const ScenePtr scene = mixed();
   const std::vector<uint32_t> none(scene->view().lights.count, kNoLight);
@@ -125,19 +125,19 @@ TEST(Wave, LightsThatBouncesHitNeedTrails) {
 }
 
 TEST(Wave, PresenceIsOnePicture) {
-  expect_one_image(presence(), small_settings());
+  expect_one_image(presence(), wave_settings());
 }
 
 TEST(Wave, CurvesAndPointsAreOnePicture) {
-  expect_one_image(curve_testing::hairy(), small_settings());
+  expect_one_image(curve_testing::hairy(), wave_settings());
 }
 
 TEST(Wave, EverySettingIsOnePicture) {
-  Settings s = small_settings();
+  Settings s = wave_settings();
   s.width = s.height = 13;
   s.cosine_sampling = true;
   expect_one_image(mixed(), s);
-  s = small_settings();
+  s = wave_settings();
   s.width = s.height = 13;
   s.sampler = SamplerKind::kIndependent;
   s.roulette = RouletteKind::kOff;
@@ -152,7 +152,7 @@ TEST(Wave, EverySettingIsOnePicture) {
 TEST(Wave, EveryPolicyIsOnePicture) {
   for (const ScenePtr& scene : {mixed(), presence()}) {
     const auto accel = std::make_shared<const EmbreeAccelerator>(scene, 2u);
-    Settings s = small_settings();
+    Settings s = wave_settings();
     const RenderedImage expected = reference(scene, s, accel);
     for (const std::string& policy : policy_names())
       for (const uint32_t wave_size : {64u, 1500u})
@@ -169,7 +169,7 @@ TEST(Wave, EveryPolicyIsOnePicture) {
 TEST(Wave, RayOrdersDoNotShow) {
   for (const ScenePtr& scene : {mixed(), presence()}) {
     const auto accel = std::make_shared<const EmbreeAccelerator>(scene, 2u);
-    Settings s = small_settings();
+    Settings s = wave_settings();
     const RenderedImage expected = reference(scene, s, accel);
     for (const uint32_t lanes : lane_widths())
       for (const RayOrder bounce : {RayOrder::kSlot, RayOrder::kMorton, RayOrder::kMortonOctant,
@@ -190,7 +190,7 @@ TEST(Wave, RayOrdersDoNotShow) {
 TEST(Wave, PacketsOfRaysDoNotShow) {
   const ScenePtr scene = mixed();
   const auto accel = std::make_shared<const EmbreeAccelerator>(scene, 2u);
-  const Settings s = small_settings();
+  const Settings s = wave_settings();
   const RenderedImage expected = reference(scene, s, accel);
   for (const uint32_t traversal : {1u, 4u, 8u, 16u}) {
     WaveRun run(scene, {s, lane_widths().back(), traversal}, accel);
@@ -221,7 +221,7 @@ TEST(Wave, LargeWaves) {
 TEST(Wave, ThreadsDoNotShow) {
   for (const ScenePtr& scene : {cornell(), mixed(), emissive_meshes(), presence()}) {
     const auto accel = std::make_shared<const EmbreeAccelerator>(scene, 2u);
-    Settings s = small_settings();
+    Settings s = wave_settings();
     WavefrontRenderer renderer(scene);
     for (const LightWeights weights : {LightWeights::kPower, LightWeights::kCalibrated}) {
       s.light_weights = weights;
@@ -296,7 +296,7 @@ TEST(Wave, EdgeCases) {
 }
 
 TEST(Wave, DepthZeroSeesEmittersOnly) {
-  Settings s = small_settings();
+  Settings s = wave_settings();
   s.max_depth = 0;
   const RenderedImage image = WavefrontRenderer(cornell()).render(s);
   size_t lit = 0;
@@ -313,7 +313,7 @@ TEST(Wave, DepthZeroSeesEmittersOnly) {
 }
 
 Settings with_all_aovs() {
-  Settings s = small_settings();
+  Settings s = wave_settings();
   s.aovs.bits = AovSet::kAll | Aov::kExpressions;
   s.expressions = {{"diffuse", "C<RD>.*"}, {"specular", "C<.[GS]>+[LO]"}, {"lamps", "C.*O"}};
   return s;
@@ -364,7 +364,7 @@ TEST(Wave, PartsAndLightGroupsAddUp) {
 }
 
 TEST(Wave, OneLightGroupByName) {
-  Settings s = small_settings();
+  Settings s = wave_settings();
   s.aovs.bits = static_cast<uint32_t>(Aov::kLightGroups);
   const RenderedImage all = WavefrontRenderer(mixed()).render(s);
   EXPECT_TRUE(all.albedo.empty());
@@ -416,7 +416,7 @@ TEST(Wave, AovsOfASimpleScene) {
   const uint32_t red = b.add_material(make_material(ProgramId::kDiffuse, {0.8f, 0.2f, 0.1f}));
   b.add_to_group(0, b.add_mesh(make_mesh(quad({-9, -9, -3}, {18, 0, 0}, {0, 18, 0}), red)));
   b.set_camera(make_camera({0, 0, 2}, {0, 0, 0}));
-  const RenderedImage p = WavefrontRenderer(b.build()).render(small_settings());
+  const RenderedImage p = WavefrontRenderer(b.build()).render(wave_settings());
   for (size_t i = 0; i < p.depth.size(); ++i) {
     EXPECT_NEAR(p.depth[i], 5, 1e-5);
     EXPECT_FLOAT_EQ(p.albedo[3 * i], 0.8f);
@@ -428,7 +428,7 @@ TEST(Wave, AovsOfASimpleScene) {
 
 TEST(Wave, CountsAgreeWithTheReference) {
   const ScenePtr scene = mixed();
-  const Settings s = small_settings();
+  const Settings s = wave_settings();
   WaveRun oracle(scene, {s, kReferenceLanes, 1});
   oracle.all(64);
   WaveRun run(scene, {s, lane_widths().back(), 16});
