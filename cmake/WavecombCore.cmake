@@ -57,7 +57,7 @@ if(WAVECOMB_SANITIZE)
   set_source_files_properties(${refiner} PROPERTIES COMPILE_OPTIONS -O0 SKIP_PRECOMPILE_HEADERS ON)
 endif()
 # Sources whose functions take a negligible part of the render time, such as scene descriptions and
-# checks of parameters, are compiled with -O1, which takes two thirds of the compile time of -O3.
+# checks of parameters, are compiled with -Og, which takes half of the compile time of -O3.
 # Sources with loops over vertices, texels, pixels or training samples keep full optimisation.
 set(cold ${core_sources})
 list(FILTER cold INCLUDE REGEX
@@ -181,13 +181,13 @@ function(wavecomb_add_core name flags)
   target_compile_options(${cold_target} PRIVATE ${core_warnings})
   target_link_libraries(${cold_target} PRIVATE ${flags} embree TBB::tbb)
   if(NOT WAVECOMB_SANITIZE)
-    target_compile_options(${cold_target} PRIVATE -O1)
+    target_compile_options(${cold_target} PRIVATE -Og)
   endif()
   target_precompile_headers(${cold_target} PRIVATE ${wavecomb_pch})
   if(WAVECOMB_SANITIZE)
     target_precompile_headers(${name} REUSE_FROM ${cold_target})
   else()
-    # GCC 12 fails if a header that was precompiled with -O1 is used with -O3.
+    # GCC 12 fails if a header that was precompiled with -Og is used with -O3.
     target_precompile_headers(${name} PRIVATE ${wavecomb_pch})
   endif()
   set_target_properties(${cold_target} PROPERTIES UNITY_BUILD ${WAVECOMB_BATCH} UNITY_BUILD_BATCH_SIZE 10)
