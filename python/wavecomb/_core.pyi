@@ -458,6 +458,7 @@ class SceneBuilder:
         shadow_falloff_gamma: float = 1,
         filter: int | None = None,
         visible: bool = True,
+        visible_to_camera: bool = True,
         motion: NDArray[np.float64] | None = None,
         portals: NDArray[np.float64] | None = None,
         # ---- to here ----
