@@ -20,6 +20,9 @@ target_compile_options(wavecomb_common INTERFACE
   # GCC 12 gives false warnings about uninitialized and out-of-bounds vectors for inlined SIMD
   # intrinsics.
   $<$<AND:$<CXX_COMPILER_ID:GNU>,$<VERSION_LESS:$<CXX_COMPILER_VERSION>,13>>:-Wno-maybe-uninitialized;-Wno-uninitialized;-Wno-array-bounds;-Wno-stringop-overflow;-Wno-stringop-overread>
+  # Without this parameter, GCC collects garbage so often that compiling takes 5 to 10 % longer. No
+  # unit needs more than 1 GB of memory either way.
+  $<$<CXX_COMPILER_ID:GNU>:--param=ggc-min-heapsize=1000000>
   $<$<BOOL:${WAVECOMB_WERROR}>:-Werror>)
 # Sanitizer checks of every reference and of every scope double the compile time of kernels and
 # containers, and quadruple the compile time of SIMD code. Only WAVECOMB_SANITIZE=all, which `make
