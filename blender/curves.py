@@ -21,6 +21,8 @@ def write_curves(into: Translation) -> None:
         mesh = thing.to_mesh()
         try:
             path = object_path(thing)
+            if thing.type == "FONT":
+                _define(into, thing, path)
             for old in (data_path(thing), f"{path}/{safe_name(thing.name)}_0"):
                 into.layer.over(old).metadata += ["active = false", "references = None"]
             if mesh is not None and len(mesh.polygons):
@@ -28,6 +30,16 @@ def write_curves(into: Translation) -> None:
                 _write(into, thing, mesh, prim)
         finally:
             thing.to_mesh_clear()
+
+
+def _define(into: Translation, thing: Any, path: str) -> None:
+    """Defines the prim of an object that the exporter does not write."""
+    prim = into.layer.define(path, "Xform")
+    # write_motion has written the transforms of objects that move.
+    if not any("xformOpOrder" in line for line in prim.lines):
+        world = thing.matrix_world
+        above = thing.parent.matrix_world.inverted_safe() if thing.parent is not None else None
+        prim.transform({into.time: world.copy() if above is None else above @ world})
 
 
 def _write(into: Translation, thing: Any, mesh: Any, prim: Prim) -> None:

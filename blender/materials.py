@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import bpy
+
 from .context import OWN, ROOT, Translation, material_path
 from .graph import Graph, Value, colour, number
 from .hair import write_hair
@@ -19,7 +21,9 @@ DEFAULT = f"{OWN}/Default"
 
 def write_materials(into: Translation) -> None:
     """Writes the materials of all visible objects, and a default for objects without material."""
-    default = dict(NEUTRAL, base_color=colour((0.8, 0.8, 0.8)), specular_weight=number(1.0))
+    # Objects without material are Principled in Blender 5.0 and diffuse in 4.2.
+    shine = 1.0 if bpy.app.version >= (5, 0, 0) else 0.0
+    default = dict(NEUTRAL, base_color=colour((0.8, 0.8, 0.8)), specular_weight=number(shine))
     _write(into, DEFAULT, default, None)
     into.layer.over(ROOT).apply("MaterialBindingAPI")
     into.layer.over(ROOT).relate("material:binding", DEFAULT)

@@ -81,7 +81,7 @@ def _normal_mapped() -> Any:
     return material
 
 
-@scene("Textures", 0.99, 1.03, 0.35, "Bump Map Correction of Cycles darkens tilted normals")
+@scene("Textures", 0.99, 1.03, 0.42, "Bump Map Correction of Cycles darkens tilted normals")
 def texture_normal_map() -> None:
     """A normal map."""
     _normal_mapped()
