@@ -94,6 +94,7 @@ def test_files_beside_it(stage: Path, whole: Path, tmp_path: Path) -> None:
     assert ours["memory_bytes"]["film"] < theirs["memory_bytes"]["film"]
 
 
+@pytest.mark.slow
 def test_a_cropped_picture_says_where_it_lies(stage: Path, whole: Path, tmp_path: Path) -> None:
     import OpenImageIO as oiio
 

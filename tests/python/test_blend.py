@@ -49,6 +49,7 @@ def test_a_missing_file(tmp_path: Path) -> None:
         blend.export(str(tmp_path / "a.blend"), str(tmp_path), None)
 
 
+@pytest.mark.slow
 def test_renders_the_exported_stage(tmp_path: Path) -> None:
     program = tmp_path / "blender"
     program.write_text(FAKE.format(python=sys.executable))

@@ -33,6 +33,7 @@ def found(root: Path, name: str, text: str) -> list[str]:
     return done.stderr.splitlines()
 
 
+@pytest.mark.slow
 def test_this_tree_is_clean() -> None:
     done = run(ROOT)
     assert done.returncode == 0, done.stderr

@@ -126,6 +126,7 @@ def test_a_limit_is_kept_by_a_render_that_had_none(cornell: Any) -> None:
         state, least = ended.state, result.samples.min()
 
 
+@pytest.mark.slow
 def test_more_is_to_come_when_a_render_goes_on(cornell: Any) -> None:
     settings = _core.Settings(width=48, height=40, noise=0.0001, spp=1 << 16)
     begun = StopAt(2)
@@ -333,6 +334,7 @@ def test_signals_save(stage: Path, tmp_path: Path) -> None:
         assert "a.exr holds what was done" in errors
 
 
+@pytest.mark.slow
 def test_resume_takes_settings_from_the_checkpoint(stage: Path, tmp_path: Path) -> None:
     one, two, file = tmp_path / "1.exr", tmp_path / "2.exr", tmp_path / "a.ckpt"
     done = run(stage, "-o", one, "--noise", 0.08, "--seed", 9, "--checkpoint", file)

@@ -469,6 +469,7 @@ def wavecomb(*arguments: Any) -> subprocess.CompletedProcess[str]:
     return forks.wavecomb(*arguments)
 
 
+@pytest.mark.slow
 def test_from_scene_to_comparison(tmp_path: Path) -> None:
     pytest.importorskip("wavecomb._core")
     stage, small = tmp_path / "box.usda", ("--size", 48, 40, "--spp", 4)

@@ -63,6 +63,7 @@ def test_settings_of_paths_change_the_picture_alike(mixed: Any) -> None:
         assert np.array_equal(waves, reference), way
 
 
+@pytest.mark.slow
 def test_parts_are_those_of_the_whole(mixed: Any) -> None:
     whole = render(mixed).beauty
     x0, y0, x1, y1 = region = (9, 5, 27, 22)

@@ -132,6 +132,7 @@ def test_guides_are_kept_from_files_unless_asked_for(tmp_path: Path) -> None:
         assert "guide_normal" not in layers
 
 
+@pytest.mark.slow
 def test_broken_pixels_are_filled_in(pictures: Any) -> None:
     from wavecomb.image.denoise import denoise
 

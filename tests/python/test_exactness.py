@@ -424,6 +424,7 @@ class Shuffled(wavecomb.SchedulingPolicy):
 
 
 @pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.slow
 def test_a_senseless_order_gives_the_same_picture(scene: str, scene_of: Any) -> None:
     for roulette in ROULETTES:
         picture = render(

@@ -220,6 +220,7 @@ def test_what_the_command_refuses(stage: Path, tmp_path: Path) -> None:
     assert not any(f"\n  {command} " in said for command in (*gone, "plan"))
 
 
+@pytest.mark.slow
 def test_a_size_in_percent(stage: Path, tmp_path: Path) -> None:
     words = ("-o", tmp_path / "a.exr", "--size", "12.5%", "--on", "none", "--job", tmp_path / "job")
     done = run("farm", "submit", stage, *words)

@@ -78,6 +78,7 @@ def test_a_layer_that_is_a_fifo(tmp_path: Path, fifo: Any, way: str, isolate: st
 
 
 @pytest.mark.parametrize("busy_threads", [0, 1])
+@pytest.mark.slow
 def test_a_program_that_loads_such_a_stage(tmp_path: Path, fifo: Any, busy_threads: int) -> None:
     """Threads that compute something else must not hide that the thread of `load` waits."""
     fifo("f.usda")

@@ -17,6 +17,7 @@ MAX_BYTES = 100_000
 
 
 @pytest.mark.parametrize("name", golden_names())
+@pytest.mark.slow
 def test_wave_equals_reference(name: str) -> None:
     scene = read_golden(name)
     made = scene.batches(TEST_BATCHES, 0, scene.spp, threads=2)

@@ -87,6 +87,7 @@ def test_one_picture_whatever_the_schedule(
 
 
 @pytest.mark.parametrize("way", WAYS, ids=str)
+@pytest.mark.slow
 def test_parts_are_those_of_the_whole(cornell: Any, way: dict[str, Any]) -> None:
     whole = render(cornell, **way)
     x0, y0, x1, y1 = box = (10, 20, 43, 50)
@@ -152,6 +153,7 @@ def test_what_was_learned_goes_on_with_a_render(cornell: Any, stopped: dict[str,
     assert np.array_equal(again.beauty, whole.beauty) and not again.stats["guiding"]["kept"]
 
 
+@pytest.mark.slow
 def test_more_samples_are_guided_as_those_before(cornell: Any, stopped: dict[str, Any]) -> None:
     """A render that is resumed with more samples keeps its guiding field."""
     more = _core.render(cornell, as_settings(guiding="on", spp=160), state=stopped)
@@ -318,6 +320,7 @@ def test_auto_learns_only_where_that_is_a_small_share(cornell: Any) -> None:
     assert 20_000 < learned["paths"] <= 240_000 and learned["seconds"] < 4
 
 
+@pytest.mark.slow
 def test_a_limit_of_time_is_taught_for_as_long_as_it_may_be(cornell: Any) -> None:
     """The first training round assumes a rendering speed; later rounds use measured speeds."""
     way: dict[str, Any] = {"spp": 2**20, "threads": 2, "guiding": "on", "region": (0, 0, 1, 1)}

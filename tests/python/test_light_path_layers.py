@@ -57,6 +57,7 @@ def total(picture: wavecomb.Picture, names: Any) -> Any:
 
 @pytest.mark.parametrize("transport", ["light", "bdpt"])
 @pytest.mark.parametrize("name", ["caustics", "mixed"])
+@pytest.mark.slow
 def test_layers_add_up_and_leave_the_beauty(stages: Any, name: str, transport: str) -> None:
     plain = render(stages[name], transport=transport, aovs=[])
     found = render(stages[name], transport=transport)

@@ -71,6 +71,7 @@ def test_splats_go_to_one_pixel_where_a_denoiser_follows(stages: Any) -> None:
     assert np.array_equal(render(stage, aovs=guides, light_splats="filtered").beauty, filtered)
 
 
+@pytest.mark.slow
 def test_a_denoiser_removes_the_noise_of_light_paths(stages: Any) -> None:
     """After denoising, noise that is equal in neighbouring pixels would remain as grain."""
     pytest.importorskip("pyoidn")

@@ -12,6 +12,8 @@ import pytest
 import wavecomb
 from wavecomb import _core
 
+pytestmark = pytest.mark.slow
+
 HIDDEN = "bool primvars:wavecomb:visibility:camera = 0"
 KINDS = {
     "RectLight": "float inputs:width = 2\n float inputs:height = 1",
@@ -65,7 +67,7 @@ def Mesh "Plain" {{
     point3f[] points = [(0, -3, 0), (4, -3, 0), (4, 3, 0), (0, 3, 0)]
 }}
 """
-SIZE = {"size": (48, 32), "spp": 4, "seed": 3}
+SIZE = {"size": (48, 32), "spp": 4, "seed": 3, "quality": "plain"}
 
 
 def write(folder: Path, kind: str, flags: str = "", above: str = "", *, mirror: bool) -> Path:
@@ -77,8 +79,9 @@ def write(folder: Path, kind: str, flags: str = "", above: str = "", *, mirror: 
     return path
 
 
-def render(path: Path, **settings: Any) -> Any:
-    return np.asarray(wavecomb.render(wavecomb.load(path), **(SIZE | settings)).beauty)
+def render(stage: Any, **settings: Any) -> Any:
+    loaded = wavecomb.load(stage) if isinstance(stage, Path) else stage
+    return np.asarray(wavecomb.render(loaded, **(SIZE | settings)).beauty)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -109,16 +112,16 @@ def test_a_mirror_shows_the_light(tmp_path: Path, kind: str) -> None:
 
 
 @pytest.mark.parametrize("transport", ["path", "light"])
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", ["RectLight", "CylinderLight"])
 def test_the_image_does_not_depend_on_the_schedule(
     tmp_path: Path, kind: str, transport: str
 ) -> None:
-    path = write(tmp_path, kind, HIDDEN, mirror=True)
+    stage = wavecomb.load(write(tmp_path, kind, HIDDEN, mirror=True))
     settings = {"transport": transport, "spp": 2}
-    first = render(path, integrator="reference", threads=1, **settings)
+    first = render(stage, integrator="reference", threads=1, **settings)
     for lanes in _core.lane_widths():
-        assert np.array_equal(first, render(path, lanes=lanes, **settings))
-    assert np.array_equal(first, render(path, wave_size=256, threads=2, **settings))
+        assert np.array_equal(first, render(stage, lanes=lanes, **settings))
+    assert np.array_equal(first, render(stage, wave_size=256, threads=2, **settings))
 
 
 def test_the_attribute_is_inherited(tmp_path: Path) -> None:

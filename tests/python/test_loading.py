@@ -280,6 +280,7 @@ print((memory("VmHWM") - before) / count)
 
 
 @LINUX
+@pytest.mark.slow
 def test_instances_are_not_held_twice_while_a_scene_is_made() -> None:
     """An instance needs about 150 bytes, since the builder frees its copies early."""
     pytest.importorskip("wavecomb._core")

@@ -63,6 +63,7 @@ def test_files_exist(page: str) -> None:
 
 
 @pytest.mark.parametrize("page", PAGES)
+@pytest.mark.slow
 def test_names_exist(page: str) -> None:
     """Each identifier in a code span of a page exists in the sources."""
     text = sources() + python_sources()

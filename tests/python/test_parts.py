@@ -85,6 +85,7 @@ def test_a_user_sees_skips(inner: pytest.Pytester) -> None:
 
 @pytest.mark.parametrize("variable", ["CI", "WAVECOMB_STRICT"])
 @pytest.mark.parametrize("workers", [[], ["-n", "1"]], ids=["alone", "worker"])
+@pytest.mark.slow
 def test_ci_sees_failures(
     inner: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, variable: str, workers: list[str]
 ) -> None:

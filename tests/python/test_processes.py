@@ -143,6 +143,7 @@ wavecomb.render(sys.argv[1], size=(8, 8), spp=1, progress=False).save(sys.argv[2
 
 
 @needs("wavecomb._core")
+@pytest.mark.slow
 def test_a_program_that_renders_imports_nothing_from_its_folder(place: Place) -> None:
     place.program(FROM_PYTHON, place.stage, place.safe / "a.exr")
     place.check()
@@ -213,6 +214,7 @@ def blender(folder: Path, name: str) -> dict[str, str]:
 
 @needs("wavecomb._core")
 @pytest.mark.parametrize("name", list(BLENDERS))
+@pytest.mark.slow
 def test_blender_imports_nothing_from_folders_of_the_user(place: Place, name: str) -> None:
     """Blender imports nothing from the working folder or the folder of the .blend file.
 

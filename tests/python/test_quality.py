@@ -44,6 +44,7 @@ def test_the_defaults_leave_the_decision_to_pilots() -> None:
     }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_the_defaults_use_light_paths_for_caustics(caustics: Any, default: Any) -> None:
     choice = default.stats["transport"]
     assert choice["chosen"] == "light" and choice["gain"] > 1.3
@@ -61,6 +62,7 @@ def test_plain_is_what_is_left_without_both(caustics: Any) -> None:
 
 
 @pytest.mark.parametrize("quality", ["auto", "plain"])
+@pytest.mark.slow
 def test_each_part_can_be_forced(caustics: Any, quality: str) -> None:
     way: dict[str, Any] = {"quality": quality, "spp": 2, "region": None, "crop": False}
     light = render(caustics, **way, transport="light")
@@ -95,6 +97,7 @@ def test_a_decision_is_handed_on(caustics: Any, default: Any) -> None:
     assert np.array_equal(second.beauty[:16, 10:26], default.beauty)
 
 
+@pytest.mark.slow
 def test_a_resumed_render_keeps_its_decision(caustics: Any, default: Any) -> None:
     stop = StopAt(1)
     _core.render(caustics, _core.Settings(**PART), watcher=stop, interval=0.001)

@@ -57,6 +57,7 @@ def test_the_room_is_furnished(stage: Usd.Stage) -> None:
     assert sum(name.startswith("Book_") for name in names) >= 12
 
 
+@pytest.mark.slow
 def test_every_material_is_bound_and_plain(stage: Usd.Stage) -> None:
     assert len(MATERIALS) >= 12
     assert {look_of(mesh) for mesh in meshes(stage)} == set(MATERIALS)

@@ -36,6 +36,7 @@ def run(folder: Path, rows: str, tier: str = "test") -> subprocess.CompletedProc
     return subprocess.run(words, capture_output=True, text=True, timeout=60)
 
 
+@pytest.mark.slow
 def test_times_budgets_and_closing_lines(tmp_path: Path) -> None:
     """Lanes run in parallel.
 

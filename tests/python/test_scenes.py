@@ -156,6 +156,7 @@ def test_mixed_has_many_materials_over_all_programs(experiment: dict[str, Usd.St
 
 
 @pytest.mark.parametrize("name", ["mixed", "dragon"])
+@pytest.mark.slow
 def test_mirror_sky_and_ground(experiment: dict[str, Usd.Stage], name: str) -> None:
     stage = experiment[name]
     mirror = stage.GetPrimAtPath("/World/Set/Mirror")

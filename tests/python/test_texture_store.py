@@ -98,6 +98,7 @@ def test_the_picture_is_the_same_within_the_limit(stage, whole, policy):
 
 
 @needs_store
+@pytest.mark.slow
 def test_what_fits_needs_no_file(stage, whole):
     result = picture(stage, texture_limit=16)
     assert np.array_equal(result.beauty, whole)

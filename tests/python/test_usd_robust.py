@@ -337,6 +337,7 @@ def test_material_networks_with_endless_ways(tmp_path):
     assert scene.material_of("M")["program"] == "openpbr"
 
 
+@pytest.mark.slow
 def test_composition_errors_are_lines_and_not_spilt(tmp_path):
     path = write(
         tmp_path,

@@ -67,6 +67,7 @@ def click(box, text):
     box.findChild(QPushButton, f"autosave.{text.lower()}").click()
 
 
+@pytest.mark.slow
 def test_edits_are_copied_until_they_are_saved_or_undone(new_window, qtbot, path, tmp_path):
     window = new_window(path)
     edits = window.scene.edits

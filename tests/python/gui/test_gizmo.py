@@ -96,6 +96,7 @@ def world(window, path):
     return np.array(cache.GetLocalToWorldTransform(window.session.usd.GetPrimAtPath(path)))
 
 
+@pytest.mark.slow
 def test_a_light_follows_its_handle_at_once_and_undoes_in_one_step(moved):
     before = world(moved, KEY)
     moved.drag(KEY, Qt.Key.Key_W, "y", (0, -40))
@@ -109,6 +110,7 @@ def test_a_light_follows_its_handle_at_once_and_undoes_in_one_step(moved):
     assert np.allclose(world(moved, KEY), before) and moved.scene.edits.lines() == []
 
 
+@pytest.mark.slow
 def test_an_object_moves_when_the_drag_ends(moved, qtbot):
     before = moved.session.scene.bounds_of(BALL)
     moved.drag(BALL, Qt.Key.Key_W, "all", (40, 0))
@@ -125,6 +127,7 @@ def test_an_object_moves_when_the_drag_ends(moved, qtbot):
     assert moved.scene.edits.lines() == []
 
 
+@pytest.mark.slow
 def test_an_object_follows_the_drag_without_loading(moved, qtbot):
     session, opened = moved.session, []
     session.opened.connect(opened.append)
@@ -157,6 +160,7 @@ def test_an_object_follows_the_drag_without_loading(moved, qtbot):
     assert np.abs(loaded.beauty - frame.beauty).mean() < 1e-3 * loaded.beauty.mean()
 
 
+@pytest.mark.slow
 def test_moves_of_a_group_and_of_its_parts_add_up(moved, qtbot):
     session, edits, opened = moved.session, moved.scene.edits, []
     session.opened.connect(opened.append)
@@ -250,6 +254,7 @@ def test_prims_that_the_render_can_follow(tmp_path):
     assert changed == {Sdf.Path("/World/Free/A"), Sdf.Path("/World/Copy/A")}
 
 
+@pytest.mark.slow
 def test_rotation_follows_the_cursor_and_scale_the_axes_of_the_prim(moved):
     moved.session.change(spp=1)
     before = world(moved, KEY)
@@ -264,6 +269,7 @@ def test_rotation_follows_the_cursor_and_scale_the_axes_of_the_prim(moved):
     assert sizes[0] != pytest.approx(1.0, abs=0.02) and np.allclose(sizes[1:], 1.0, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_edited_transforms_are_saved_and_read_again(moved, tmp_path):
     moved.drag(KEY, Qt.Key.Key_W, "y", (0, -40))
     wanted = world(moved, KEY)

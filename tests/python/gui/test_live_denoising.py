@@ -34,6 +34,7 @@ class SlowDenoiser:
         return frame, np.full(frame.beauty.shape, frame.samples_done, np.float32)
 
 
+@pytest.mark.slow
 def test_a_slow_denoiser_never_shows_incomplete_or_late_images(
     new_session, qtbot, cornell, monkeypatch, final
 ):

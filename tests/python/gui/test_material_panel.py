@@ -103,6 +103,7 @@ def test_an_openpbr_material_shows_its_own_inputs(panel):
     assert "emissive_strength" in materials.fields and "Iridescence" in materials.form.groups
 
 
+@pytest.mark.slow
 def test_what_a_texture_drives_has_no_value(panel, qtbot):
     """Every material can be selected, and driven inputs show their source in place of a value."""
     materials = panel.materials

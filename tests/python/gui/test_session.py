@@ -142,6 +142,7 @@ def test_a_bad_edit_is_told_and_the_render_goes_on(session, final, qtbot):
     final(session)
 
 
+@pytest.mark.slow
 def test_cancel_within_100_ms(new_session, qtbot, cornell):
     session = new_session(width=640, height=640, spp=4096)
     session.open(cornell)
@@ -176,6 +177,7 @@ def test_the_ui_is_free_while_it_renders(new_session, qtbot, cornell):
     assert sorted(calls)[len(calls) // 2] < 0.05, calls
 
 
+@pytest.mark.slow
 def test_pause_stop_and_resume(new_session, qtbot, cornell):
     session = new_session(width=128, height=128, spp=100_000)
     watched = Watched(session)
@@ -198,6 +200,7 @@ def test_pause_stop_and_resume(new_session, qtbot, cornell):
     assert session.state == "rendering" and session.version > version
 
 
+@pytest.mark.slow
 def test_a_pause_that_comes_while_a_frame_is_made_is_told(new_session, qtbot, cornell):
     session = new_session(width=64, height=64, spp=100_000)
     engine = session._engine
