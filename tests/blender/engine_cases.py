@@ -66,6 +66,27 @@ def same(folder: Path) -> None:
     emit(same=bool(np.array_equal(again, image[..., :3])))
 
 
+def stamp(folder: Path) -> None:
+    """Saves an image with and without a render stamp."""
+    import bpy
+
+    scene, _ = _ball()
+    render = scene.render
+    render.image_settings.file_format = "PNG"
+    for name in dir(render):
+        if name.startswith("use_stamp_"):
+            setattr(render, name, name == "use_stamp_note")
+    render.stamp_font_size, render.stamp_note_text = 8, "seen"
+    pixels = []
+    for wanted in (False, True):
+        render.use_stamp, render.filepath = wanted, str(folder / f"{wanted}.png")
+        bpy.ops.render.render(write_still=True)
+        image = bpy.data.images.load(render.filepath)
+        pixels.append(np.array(image.pixels[:]).reshape(image.size[1], image.size[0], 4))
+    changed = np.any(np.abs(pixels[0] - pixels[1]) > 0.05, axis=2)
+    emit(stamped=int(changed.sum()), others=float(1.0 - changed.mean()))
+
+
 def _message(scene: Any) -> str:
     import bpy
 
@@ -362,6 +383,7 @@ if __name__ == "__main__":
         one.__name__: one
         for one in (
             same,
+            stamp,
             errors,
             standby,
             full,

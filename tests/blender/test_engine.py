@@ -32,6 +32,13 @@ def test_command_line_writes_the_same_image(blender: Run, tmp_path: Path) -> Non
     assert row["same"] is True
 
 
+def test_images_are_stamped(blender: Run, tmp_path: Path) -> None:
+    """Blender writes its stamp into a saved image, and leaves the rest as it is."""
+    row = _rows(blender(str(HERE / "engine_cases.py"), "stamp", str(tmp_path)))
+    assert int(str(row["stamped"])) > 30
+    assert float(str(row["others"])) > 0.3
+
+
 def test_errors_are_one_line(blender: Run, tmp_path: Path) -> None:
     """A missing program, a missing camera and a killed process do not end Blender."""
     row = _rows(blender(str(HERE / "engine_cases.py"), "errors", str(tmp_path)))

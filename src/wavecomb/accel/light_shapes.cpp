@@ -52,10 +52,9 @@ Bounds box_at_mid_shutter(const LightGeometry& shape) {
 bool LightGeometry::operator==(const LightGeometry& other) const {
   const LightRecord &a = light, &b = other.light;
   return shape == other.shape && delta_bounces_only == other.delta_bounces_only &&
-         a.kind == b.kind && a.radius == b.radius &&
-         std::ranges::equal(a.p, b.p) && std::ranges::equal(a.u, b.u) &&
-         std::ranges::equal(a.v, b.v) && std::ranges::equal(motion.origin, other.motion.origin) &&
-         steps == other.steps;
+         a.kind == b.kind && a.radius == b.radius && std::ranges::equal(a.p, b.p) &&
+         std::ranges::equal(a.u, b.u) && std::ranges::equal(a.v, b.v) &&
+         std::ranges::equal(motion.origin, other.motion.origin) && steps == other.steps;
 }
 
 std::vector<LightGeometry> light_shapes(const Scene& scene) {

@@ -20,8 +20,8 @@ struct LightGeometry {
   const LightKindInfo* kind = nullptr;  ///< null for kNone
   /// Whether only rays that start with a delta bounce hit the light. Its shape is then kCustom.
   bool delta_bounces_only = false;
-  LightMotion motion{};                 ///< motion of the light; moving lights have the shape
-                                        ///< kCustom
+  LightMotion motion{};  ///< motion of the light; moving lights have the shape
+                         ///< kCustom
   std::vector<LightStep> steps;
 
   bool operator==(const LightGeometry& other) const;
