@@ -7,15 +7,19 @@ from typing import Any
 
 import numpy as np
 
-from .context import Translation, data_path, material_path, object_path
+from .context import OWN, ROOT, Translation, data_path, material_path, object_path
 from .usda import Prim, safe_name
+
+KINDS = ("CURVE", "SURFACE", "FONT")
+_UNUSED = 2**31 - 1
+"""Value of the unused numbers of an instance's persistent id."""
 
 
 def write_curves(into: Translation) -> None:
     """Writes curve objects as meshes; Blender's exporter writes strands of a fixed width."""
     for thing in into.depsgraph.objects:
         # The exporter of Blender 4.2 does not write text objects.
-        kinds = ("CURVE", "SURFACE") if into.instancing else ("CURVE", "SURFACE", "FONT")
+        kinds = ("CURVE", "SURFACE") if into.instancing else KINDS
         if thing.type not in kinds or thing.data is None:
             continue
         mesh = thing.to_mesh()
@@ -30,6 +34,40 @@ def write_curves(into: Translation) -> None:
                 _write(into, thing, mesh, prim)
         finally:
             thing.to_mesh_clear()
+
+
+def write_instanced_curves(into: Translation) -> None:
+    """Writes instances of curves and texts as meshes, each shape once.
+
+    Blender's exporter writes instances of curves as strands, whose width it takes for a radius of
+    1, and no texts.
+    """
+    found = []
+    for instance in into.depsgraph.object_instances:
+        thing = instance.object
+        if not instance.is_instance or not instance.show_self or thing.type not in KINDS:
+            continue
+        ids = [str(one) for one in instance.persistent_id if one < _UNUSED]
+        name = "_".join([safe_name(thing.name), *reversed(ids)])
+        above = object_path(instance.parent.original)
+        found.append((thing.original, instance.matrix_world.copy(), f"{above}/{name}"))
+    first: dict[str, str] = {}
+    for count, (original, matrix, exported) in enumerate(found):
+        # The prototypes of curves refer to themselves.
+        for old in (exported, f"{ROOT}/prototypes/{exported.rpartition('/')[2]}"):
+            into.layer.over(old).metadata += ["active = false"]
+        path = f"{OWN}/Curves/{safe_name(original.name)}_{count}"
+        into.layer.define(path, "Xform").transform({into.time: matrix})
+        shape = into.layer.define(f"{path}/Shape", "Mesh")
+        if original.name in first:
+            shape.metadata.append(f"references = <{first[original.name]}>")
+            continue
+        first[original.name] = f"{path}/Shape"
+        thing = original.evaluated_get(into.depsgraph)
+        mesh = thing.to_mesh()
+        if mesh is not None and len(mesh.polygons):
+            _write(into, thing, mesh, shape)
+        thing.to_mesh_clear()
 
 
 def _define(into: Translation, thing: Any, path: str) -> None:

@@ -13,7 +13,7 @@ import bpy
 
 from .camera import CAMERA, write_camera
 from .context import Translation
-from .curves import write_curves
+from .curves import write_curves, write_instanced_curves
 from .lights import write_lights
 from .materials import write_materials
 from .motion import Sampled, write_motion
@@ -179,6 +179,7 @@ def export_stage(
     write_materials(into)
     write_textures(into)
     write_curves(into)
+    write_instanced_curves(into)
     write_visibility(into)
     try:
         into.layer.save(into.file(CORRECTION))

@@ -175,6 +175,29 @@ def instance_collection() -> None:
 
 
 @scene("Instances")
+def instance_text_and_curve() -> None:
+    """Instances of a collection with a text and a bevelled curve."""
+    studio()
+    group = bpy.data.collections.new("group")
+    text = bpy.data.curves.new("text", "FONT")
+    text.body, text.extrude, text.align_x = "Ab", 0.15, "CENTER"
+    text.materials.append(principled("a", base_color=(0.7, 0.3, 0.2)))
+    curve = bpy.data.curves.new("curve", "CURVE")
+    curve.dimensions, curve.bevel_depth, curve.bevel_resolution = "3D", 0.1, 4
+    line = curve.splines.new("POLY")
+    line.points.add(1)
+    for point, x in zip(line.points, (-0.6, 0.6), strict=True):
+        point.co = (x, 0.0, 1.0, 1.0)
+    curve.materials.append(principled("b", base_color=(0.2, 0.3, 0.7)))
+    for thing in (link("text", text, (0, 0, 0.1), (math.pi / 2, 0, 0)), link("curve", curve)):
+        bpy.context.scene.collection.objects.unlink(thing)
+        group.objects.link(thing)
+    for x in (-1.5, 1.5):
+        empty = link("instance", None, (x, 0, 0), (0, 0, 0.3 * x))
+        empty.instance_type, empty.instance_collection = "COLLECTION", group
+
+
+@scene("Instances")
 def instance_vertices() -> None:
     """An object instanced on the vertices of another."""
     studio()
