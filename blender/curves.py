@@ -27,13 +27,18 @@ def write_curves(into: Translation) -> None:
             path = object_path(thing)
             if thing.type == "FONT":
                 _define(into, thing, path)
-            for old in (data_path(thing), f"{path}/{safe_name(thing.name)}_0"):
-                into.layer.over(old).metadata += ["active = false", "references = None"]
+            _hide_strands(into, thing)
             if mesh is not None and len(mesh.polygons):
                 prim = into.layer.define(f"{path}/WavecombMesh", "Mesh")
                 _write(into, thing, mesh, prim)
         finally:
             thing.to_mesh_clear()
+
+
+def _hide_strands(into: Translation, thing: Any) -> None:
+    """Deactivates what the exporter has written for the shape of a curve object."""
+    for old in (data_path(thing), f"{object_path(thing)}/{safe_name(thing.name)}_0"):
+        into.layer.over(old).metadata += ["active = false", "references = None"]
 
 
 def write_instanced_curves(into: Translation) -> None:
@@ -56,6 +61,9 @@ def write_instanced_curves(into: Translation) -> None:
         # The prototypes of curves refer to themselves.
         for old in (exported, f"{ROOT}/prototypes/{exported.rpartition('/')[2]}"):
             into.layer.over(old).metadata += ["active = false"]
+        if original.hide_render:  # Blender shows no instances of such a curve.
+            _hide_strands(into, original)
+            continue
         path = f"{OWN}/Curves/{safe_name(original.name)}_{count}"
         into.layer.define(path, "Xform").transform({into.time: matrix})
         shape = into.layer.define(f"{path}/Shape", "Mesh")
