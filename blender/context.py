@@ -58,6 +58,12 @@ class Translation:
         return self.samples.get(name) or {self.time: matrix}
 
 
+def local_matrix(thing: Any) -> Any:
+    """Returns the transform of an object to its parent, or to the world if it has no parent."""
+    world = thing.matrix_world.copy()
+    return world if thing.parent is None else thing.parent.matrix_world.inverted_safe() @ world
+
+
 def object_path(thing: Any) -> str:
     """Returns the path of the prim that the exporter writes for an object."""
     names = []

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .context import OWN, ROOT, Translation, data_path, material_path, object_path
+from .context import OWN, ROOT, Translation, data_path, local_matrix, material_path, object_path
 from .usda import Prim, safe_name
 
 KINDS = ("CURVE", "SURFACE", "FONT")
@@ -22,17 +22,11 @@ def write_curves(into: Translation) -> None:
         kinds = ("CURVE", "SURFACE") if into.instancing else KINDS
         if thing.type not in kinds or thing.data is None:
             continue
-        mesh = thing.to_mesh()
-        try:
-            path = object_path(thing)
-            if thing.type == "FONT":
-                _define(into, thing, path)
-            _hide_strands(into, thing)
-            if mesh is not None and len(mesh.polygons):
-                prim = into.layer.define(f"{path}/WavecombMesh", "Mesh")
-                _write(into, thing, mesh, prim)
-        finally:
-            thing.to_mesh_clear()
+        path = object_path(thing)
+        if thing.type == "FONT":
+            _define(into, thing, path)
+        _hide_strands(into, thing)
+        _write_mesh(into, thing, f"{path}/WavecombMesh")
 
 
 def _hide_strands(into: Translation, thing: Any) -> None:
@@ -58,7 +52,7 @@ def write_instanced_curves(into: Translation) -> None:
         found.append((thing.original, instance.matrix_world.copy(), f"{above}/{name}"))
     first: dict[str, str] = {}
     for count, (original, matrix, exported) in enumerate(found):
-        # The prototypes of curves refer to themselves.
+        # The exporter of Blender 5.0 writes prototypes of curves that reference themselves.
         for old in (exported, f"{ROOT}/prototypes/{exported.rpartition('/')[2]}"):
             into.layer.over(old).metadata += ["active = false"]
         if original.hide_render:  # Blender shows no instances of such a curve.
@@ -66,16 +60,12 @@ def write_instanced_curves(into: Translation) -> None:
             continue
         path = f"{OWN}/Curves/{safe_name(original.name)}_{count}"
         into.layer.define(path, "Xform").transform({into.time: matrix})
-        shape = into.layer.define(f"{path}/Shape", "Mesh")
+        shape = f"{path}/Shape"
         if original.name in first:
-            shape.metadata.append(f"references = <{first[original.name]}>")
-            continue
-        first[original.name] = f"{path}/Shape"
-        thing = original.evaluated_get(into.depsgraph)
-        mesh = thing.to_mesh()
-        if mesh is not None and len(mesh.polygons):
-            _write(into, thing, mesh, shape)
-        thing.to_mesh_clear()
+            copy = into.layer.define(shape, "Mesh")
+            copy.metadata.append(f"references = <{first[original.name]}>")
+        elif _write_mesh(into, original.evaluated_get(into.depsgraph), shape):
+            first[original.name] = shape
 
 
 def _define(into: Translation, thing: Any, path: str) -> None:
@@ -83,9 +73,19 @@ def _define(into: Translation, thing: Any, path: str) -> None:
     prim = into.layer.define(path, "Xform")
     # write_motion has written the transforms of objects that move.
     if not any("xformOpOrder" in line for line in prim.lines):
-        world = thing.matrix_world
-        above = thing.parent.matrix_world.inverted_safe() if thing.parent is not None else None
-        prim.transform({into.time: world.copy() if above is None else above @ world})
+        prim.transform({into.time: local_matrix(thing)})
+
+
+def _write_mesh(into: Translation, thing: Any, path: str) -> bool:
+    """Writes the mesh that Blender makes of a curve; returns whether it has faces."""
+    mesh = thing.to_mesh()
+    try:
+        has_faces = mesh is not None and len(mesh.polygons) > 0
+        if has_faces:
+            _write(into, thing, mesh, into.layer.define(path, "Mesh"))
+        return has_faces
+    finally:
+        thing.to_mesh_clear()
 
 
 def _write(into: Translation, thing: Any, mesh: Any, prim: Prim) -> None:

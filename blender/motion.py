@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from .context import Translation, data_path, object_path
+from .context import Translation, data_path, local_matrix, object_path
 
 RIGID = {"MESH", "CURVE", "SURFACE", "FONT", "META", "CURVES", "POINTCLOUD", "VOLUME", "EMPTY",
          "CAMERA", "LIGHT", "ARMATURE", "LATTICE"}  # fmt: skip
@@ -107,10 +107,8 @@ def _sample_at(depsgraph: Any, time: float, found: Sampled, with_shapes: bool) -
     for thing in depsgraph.objects:
         if thing.type not in RIGID:
             continue
-        world = thing.matrix_world.copy()
-        found.matrices.setdefault(thing.name, {})[time] = world
-        local = world if thing.parent is None else thing.parent.matrix_world.inverted_safe() @ world
-        found.local.setdefault(thing.name, {})[time] = local
+        found.matrices.setdefault(thing.name, {})[time] = thing.matrix_world.copy()
+        found.local.setdefault(thing.name, {})[time] = local_matrix(thing)
         if with_shapes and thing.type == "MESH":
             found.shapes.setdefault(thing.name, {})[time] = _shape_of(thing)
 

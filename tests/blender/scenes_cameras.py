@@ -199,7 +199,13 @@ def volume_principled() -> None:
 # ---- combinations --------------------------------------------------------------------------------
 
 
-@scene("Combined", 0.96, 1.03, 0.2, "noisy caustics of rough glass if the camera sees no light")
+@scene(
+    "Combined",
+    0.96,
+    1.03,
+    0.2,
+    "noisy caustics of rough glass under a light hidden from the camera",
+)
 def combined_still_life() -> None:
     """Glass, metal, cloth and a texture under three lights."""
     floor((0.5, 0.4, 0.3))

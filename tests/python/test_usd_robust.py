@@ -383,7 +383,7 @@ def test_bad_cameras_and_lights(tmp_path):
 @needs_asset("usd/Teapot/Teapot.usd")
 @pytest.mark.parametrize("step", [21, pytest.param(1, marks=pytest.mark.long)])
 def test_every_asset_loads(capfd, step):
-    """Every test asset loads, or every seventh in short tests."""
+    """Every test asset loads, or every 21st in short tests."""
     stages = [p for p in sorted((ASSETS / "usd").rglob("*.usd*")) if p.is_file()][::step]
     assert stages
     refused = []

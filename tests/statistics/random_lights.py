@@ -27,7 +27,7 @@ class Lights:
         self, random: Generator, folder: Path, materials: Materials, linked: list[str]
     ) -> None:
         self.random = random
-        # Own numbers, so that the stages of earlier seeds keep everything else.
+        # A separate generator, so that all other choices of a seed stay the same.
         self.shapes = random.spawn(1)[0]
         self.folder = folder
         self.materials = materials

@@ -70,7 +70,7 @@ def _watch(done: threading.Event, found: _BlockingFifo) -> None:
         if layers.keys() == before:
             for name in layers.keys() - searched:
                 named = _fifos(layers[name])
-                # A layer without content may still be read.
+                # USD may still be reading a layer that is empty.
                 if named is not None:
                     searched.add(name)
                     fifos |= named
