@@ -717,6 +717,8 @@ class Settings:
     """Stores only the pixels of the render region, in memory and in files. Default: False."""
     roulette: Literal["auto", "off", "throughput", "cost-aware", "efficient"]
     """Russian roulette, which terminates paths early without bias. Default: auto."""
+    shadow_roulette: Literal["off", "on"]
+    """Whether Russian roulette saves shadow rays. Default: on."""
     quality: Literal["auto", "plain"]
     """Whether short pilot renders decide if path guiding and light paths are used. Default:
     auto."""

@@ -62,6 +62,7 @@ class SettingKeywords(TypedDict, total=False):
     deep_tolerance: float
     crop: bool
     roulette: Literal["auto", "off", "throughput", "cost-aware", "efficient"]
+    shadow_roulette: Literal["off", "on"]
     quality: Literal["auto", "plain"]
     transport: Literal["path", "light", "auto", "bdpt"]
     light_aim: Literal["off", "on"]

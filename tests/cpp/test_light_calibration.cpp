@@ -184,6 +184,43 @@ TEST(LightCalibration, IsLeftOutWhereThereIsNothingToShare) {
   }
 }
 
+/// Returns the number of shadow rays in an image of a box under lights of `scale` times their
+/// usual radiance: a rect light and, if `dome` is set, a dome.
+uint64_t shadow_rays(const Settings& settings, float scale, bool dome) {
+  SceneBuilder b;
+  const uint32_t white = b.add_material(make_material(ProgramId::kDiffuse, {0.6f, 0.6f, 0.6f}));
+  for (const MeshData& m : {ground(10), box({-1, 0, -1}, {1, 2, 1})})
+    b.add_to_group(0, b.add_mesh(make_mesh(m, white, "mesh")));
+  b.add_light(
+      make_light(LightKind::kRect, Vec3<float>(13 * scale), translate(-3, 9, 4) * rotate(0, -70)));
+  if (dome) b.add_light(make_light(LightKind::kDome, Vec3<float>(0.1f * scale)));
+  b.set_camera(make_camera({0, 6, 12}, {0, 0, 0}, 1));
+  WavefrontRenderer renderer(b.build(), 1);
+  renderer.render(settings);
+  return renderer.statistics().shadow_rays;
+}
+
+TEST(ShadowRoulette, SavesRaysWhateverTheUnitOfLight) {
+  Settings s = small();
+  s.spp = 8;
+  s.max_depth = 6;
+  for (const bool dome : {false, true}) {
+    const uint64_t saving = shadow_rays(s, 1, dome);
+    Settings all = s;
+    all.shadow_roulette = false;
+    const uint64_t without = shadow_rays(all, 1, dome);
+    EXPECT_LT(saving, without - without / 20) << "dome: " << dome;
+    EXPECT_GT(saving, without / 2) << "dome: " << dome;
+    // Scaling by a power of two is exact, so the same shadow rays are traced.
+    EXPECT_EQ(shadow_rays(s, 0x1p-6f, dome), saving) << "dome: " << dome;
+    EXPECT_EQ(shadow_rays(all, 0x1p-6f, dome), without) << "dome: " << dome;
+    // Without calibrated light weights, no brightness is known.
+    s.light_weights = all.light_weights = LightWeights::kPower;
+    EXPECT_EQ(shadow_rays(s, 1, dome), shadow_rays(all, 1, dome)) << "dome: " << dome;
+    s.light_weights = LightWeights::kCalibrated;
+  }
+}
+
 TEST(LightCalibration, StandsWhatStagesBring) {
   const auto expect_sane = [](const ScenePtr& scene, const Settings& s, const char* what) {
     for (const LightSelection selection : {LightSelection::kPower, LightSelection::kTree}) {

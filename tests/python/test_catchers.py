@@ -49,7 +49,10 @@ def _stage(folder: Path, says: str = "") -> Path:
 
 def _render(stage: Path, **options: Any) -> wavecomb.Picture:
     return wavecomb.render(
-        stage, **{"size": SIZE, "spp": SPP, "aovs": ["alpha", "direct"], **options}
+        stage,
+        # The brightness of the image, which changes with visibility, affects shadow roulette.
+        **{"size": SIZE, "spp": SPP, "aovs": ["alpha", "direct"], "shadow_roulette": "off"},
+        **options,
     )
 
 

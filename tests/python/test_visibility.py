@@ -52,7 +52,8 @@ def _text(says: str = "", kind: str = "") -> str:
 def _render(folder: Path, says: str = "", **options: Any) -> wavecomb.Picture:
     return wavecomb.render(
         write(folder, _text(says)), size=SIZE, spp=SPP, aovs=["alpha", "depth", "crypto_object"],
-        **options,
+        # The brightness of the image, which changes with visibility, affects shadow roulette.
+        shadow_roulette="off", **options,
     )  # fmt: skip
 
 

@@ -50,6 +50,7 @@ PLAIN: dict[str, Any] = {
     "roulette_depth": 1,
     "light_selection": "auto",
     "light_weights": "calibrated",
+    "shadow_roulette": "off",
     "sampler": "sobol",
     # Stochastic lookup of a single texel changes the mean where shading is not linear.
     "texture_filter": "whole",
@@ -73,6 +74,7 @@ CHOICES: dict[str, tuple[Any, ...]] = {
     "roulette": ("off", "throughput", "cost-aware", "efficient"),
     "light_selection": ("auto", "tree", "power"),
     "light_weights": ("calibrated", "power"),
+    "shadow_roulette": ("off", "on"),
     "sampler": ("sobol", "independent"),
 }
 FURTHER = 300

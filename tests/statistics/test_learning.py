@@ -24,12 +24,18 @@ pytestmark = needs("wavecomb._core")
 OFF: dict[str, Any] = {
     "light_weights": "power",
     "light_selection": "power",
+    "shadow_roulette": "off",
     "allocate": "even",
     "roulette": "off",
     "guiding": "off",
 }
 PARTS: dict[str, dict[str, Any]] = {
-    "lights": {"light_weights": "calibrated", "light_selection": "auto"},
+    "lights": {
+        "light_weights": "calibrated",
+        "light_selection": "auto",
+        "shadow_roulette": "on",
+        "roulette": "throughput",
+    },
     "pixels by error": {"allocate": "error"},
     "pixels by efficiency": {"allocate": "efficiency"},
     "roulette": {"roulette": "efficient"},
@@ -38,6 +44,7 @@ PARTS: dict[str, dict[str, Any]] = {
 ALL: dict[str, Any] = {
     "light_weights": "calibrated",
     "light_selection": "auto",
+    "shadow_roulette": "on",
     "allocate": "efficiency",
     "roulette": "efficient",
     "guiding": "on",

@@ -26,6 +26,9 @@ struct Settings {
   std::optional<float> filter_width;
   RouletteKind roulette = RouletteKind::kAuto;
   uint32_t roulette_depth = 2;  ///< first vertex at which Russian roulette may terminate a path
+  /// Whether Russian roulette decides if light samples of low contribution get a shadow ray. See
+  /// `saves_shadow_rays()`.
+  bool shadow_roulette = true;
   /// Source of material costs. Costs change the image only through cost-aware roulette; with
   /// `kMeasured` costs, such an image varies from run to run.
   CostSource costs = CostSource::kAuto;
@@ -113,6 +116,12 @@ struct Settings {
   /// Returns whether light paths are merged with points that the camera sees by specular reflection
   /// or refraction.
   bool merges() const { return transport == Transport::kLight && merge_radius > 0; }
+  /// Returns whether Russian roulette decides about shadow rays. Its threshold depends on the
+  /// brightness of the image, which the calibration of light weights estimates.
+  bool saves_shadow_rays() const {
+    return shadow_roulette && roulette != RouletteKind::kOff &&
+           light_weights == LightWeights::kCalibrated;
+  }
   bool splats_to_one_pixel() const {
     return light_splats == LightSplats::kPixel ||
            (light_splats == LightSplats::kAuto && aovs.has(AovSource::kGuide));

@@ -43,14 +43,15 @@ void write(Settings& settings, const SettingValue& value) {
     settings.*kMember = static_cast<T>(std::get<int64_t>(value));
 }
 
-/// Returns a row of the settings table for a setting without limits.
+/// Returns a row of the settings table for a setting without limits, whose value is `reader`'s.
 template <auto kMember>
-SettingInfo row(const char* name, const char* label, const char* help) {
+SettingInfo row(const char* name, const char* label, const char* help,
+                SettingValue (*reader)(const Settings&) = &read<kMember>) {
   SettingInfo info;
   info.name = name;
   info.label = label;
   info.help = help;
-  info.read = &read<kMember>;
+  info.read = reader;
   info.write = &write<kMember>;
   return info;
 }
@@ -68,15 +69,10 @@ SettingInfo number(const char* name, const char* label, double least, double mos
 template <auto kMember>
 SettingInfo number_or_unset(const char* name, const char* label, double least, double most,
                             const char* help, SettingValue (*used)(const Settings&)) {
-  SettingInfo info;
-  info.name = name;
-  info.label = label;
-  info.help = help;
+  SettingInfo info = row<kMember>(name, label, help, used);
   info.least = least;
   info.most = most;
   info.may_be_none = true;
-  info.read = used;
-  info.write = &write<kMember>;
   return info;
 }
 template <auto kMember>
@@ -91,9 +87,7 @@ std::vector<SettingChoice> ray_orders() {
   return {
       {"slot", "Rays are not sorted; they keep the order of their paths."},
       {"morton", "Rays are sorted by the Morton code of their origin."},
-      {"morton-octant",
-       "Rays are sorted by the octant of their direction, then by the Morton code of their "
-       "origin."},
+      {"morton-octant", "Rays are sorted by octant of direction, then by Morton code of origin."},
       {"direction", "Rays are sorted by the octant and the major axes of their direction."},
       {"auto", "Wavecomb measures the other four orders at each path depth and uses the fastest."}};
 }
@@ -197,6 +191,11 @@ std::vector<SettingInfo> work_settings() {
             "The survival probability of a path depends on its expected contribution and cost, "
             "which are learned before the first pass."}},
           "Russian roulette, which terminates paths early without bias."),
+      choice<&S::shadow_roulette>(
+          "shadow_roulette", "Shadow roulette",
+          {{"off", "Every light sample gets a shadow ray."},
+           {"on", "Without bias, light samples of small contribution get a shadow ray at random."}},
+          "Whether Russian roulette saves shadow rays."),
       choice<&S::quality>(
           "quality", "Quality",
           {{"auto", "Path guiding and light paths are used if short pilot renders predict a gain."},

@@ -304,6 +304,9 @@ struct LightView {
   float centre[3] = {0, 0, 0};
   float radius = 0, reach = 0;
   bool emits_paths() const { return radius > 0; }
+  /// Luminance below which Russian roulette decides whether a light sample gets a shadow ray
+  /// (path/steps/sample_light.h); 0 means no roulette.
+  float shadow_threshold = 0;
   const LightAim* aim = nullptr;  ///< target spheres of light paths; null without aiming
   // Geometry for opacity graphs that read positions; null if the light set belongs to no scene.
   const MeshRecord* meshes = nullptr;

@@ -5,8 +5,13 @@
 ///   L += T_k f(wo, wi) |cos theta_i| Le / p_light  w  V,   w = p_light / (p_bounce + p_light)
 /// (balance heuristic, Veach 1997, 9.2; w = 1 for delta lights, which no bounce hits). The shadow
 /// ray determines the visibility V.
+///
+/// Light samples whose contribution has a luminance y below LightView::shadow_threshold get their
+/// shadow ray with probability q = y / threshold, and are then divided by q. Shadow rays that would
+/// hardly change the image are saved (docs/decisions/roulette.md).
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 
 #include "wavecomb/guiding/bounce/guided_bounce.h"
@@ -158,6 +163,25 @@ WAVECOMB_INLINE LightCandidate<F> resample(const LightCandidate<F>& first, const
 
 }  // namespace detail
 
+namespace detail {
+
+/// Applies Russian roulette to the shadow ray of the light sample in `out`. `limit` is the largest
+/// luminance that a contribution may have; 0 means no limit.
+template <typename F, uint32_t kFeatures>
+WAVECOMB_INLINE void survive_shadow(const Vertex<F, kFeatures>& v, float limit,
+                                    VertexResult<F>& out) {
+  float threshold = v.scene.lights.shadow_threshold;
+  if (threshold <= 0.f) return;
+  if (limit > 0.f) threshold = std::min(threshold, limit);
+  using U = UInt<F>;
+  const F u = unit_float<F>(hash_u32<U>(path_hash<F>(v.key), U(0x2545f491u + v.depth)));
+  const F q = min(F(luminance(out.direct) * (1.f / threshold)), F(1.f));
+  out.has_shadow = out.has_shadow & (u < q);
+  out.direct = out.direct * F(1.f / max(q, F(1e-10f)));
+}
+
+}  // namespace detail
+
 /// Samples a point on a light, and sets up its shadow ray. `out.next.link` must be set.
 template <typename Bsdf, typename F, uint32_t kFeatures, typename Coupling>
 WAVECOMB_INLINE void sample_light(const VertexContext<Bsdf, F, kFeatures, Coupling>& c,
@@ -176,8 +200,10 @@ WAVECOMB_INLINE void sample_light(const VertexContext<Bsdf, F, kFeatures, Coupli
   if constexpr (Bsdf::kOnFibre)
     if (lights.count > 1)
       one = detail::resample<F>(one, r, candidate_number<F>(v.key, v.depth), candidate);
-  out.direct = clean<F>(one.c, clamp_limit(v.settings, v.depth + 1));
+  const float limit = clamp_limit(v.settings, v.depth + 1);
+  out.direct = clean<F>(one.c, limit);
   out.has_shadow = one.valid & (max_component(out.direct) > 0.f);
+  detail::survive_shadow<F>(v, limit, out);
   if (v.has_links()) [[unlikely]]
     out.shadow_set = one.shadow_set;
   if (v.wants_lights()) {

@@ -38,7 +38,7 @@ void count_lights(const Learned& learned, const LearnedQuery& point, LearnedData
   }
   lights.by_tree = learned.by_tree;
   if (learned.by_tree) lights.tree = scene.light_tree(0).view();
-  if (learned.lights) learned.lights->tables.apply(lights);
+  if (learned.lights) learned.lights->apply(lights);
   LightReceiver<float> receiver(point.p, pack_normal<float>(point.n));
   std::vector<uint32_t> counts(parts.size());
   constexpr uint32_t kStep = (1u << 24) / kCountedChoices;

@@ -22,6 +22,12 @@ namespace {
 /// Calibration traces one path for every kPixelsOfPath pixels, within the limits kMinPaths and
 /// kMaxPaths.
 constexpr uint32_t kMaxPaths = 16384, kMinPaths = 1024, kPixelsOfPath = 4;
+/// If there are no probabilities to calibrate, a fraction of the paths suffices to estimate the
+/// brightness of the image.
+constexpr uint32_t kBrightnessShare = 4;
+/// Contribution below which roulette decides about the shadow ray, relative to the brightness of
+/// the image (docs/decisions/roulette.md).
+constexpr double kShadowThreshold = 0.2;
 /// Number of vertices of a calibration path at which a light is selected.
 constexpr uint32_t kVertices = 3;
 constexpr size_t kChunk = 128;
@@ -83,12 +89,23 @@ std::vector<NodeTilt> balance_nodes(const LightTreeView& tree, const LightProbes
   return tilts;
 }
 
+/// Returns LightView::shadow_threshold for an image of the given brightness. Dark parts of the
+/// image count most, as in relMSE: the threshold is relative to 1 / sqrt(mean of 1 / brightness^2).
+float shadow_threshold(const ImageTiles& tiles) {
+  if (!tiles.is_lit()) return 0;
+  double squares = 0;
+  for (const double inverse : tiles.inverse_scales()) squares += inverse * inverse;
+  const auto count = static_cast<double>(tiles.inverse_scales().size());
+  return static_cast<float>(kShadowThreshold / std::sqrt(squares / count));
+}
+
 /// Returns whether a calibration for settings `a` is valid for `b`.
 bool is_valid_for(const Settings& a, const Settings& b) {
   return a.width == b.width && a.height == b.height && a.max_depth == b.max_depth &&
          a.filter == b.filter && a.used_filter_width() == b.used_filter_width() &&
-         a.light_selection == b.light_selection && a.schlick_fresnel == b.schlick_fresnel &&
-         a.cosine_sampling == b.cosine_sampling && a.texture_filter == b.texture_filter;
+         a.light_selection == b.light_selection && a.saves_shadow_rays() == b.saves_shadow_rays() &&
+         a.schlick_fresnel == b.schlick_fresnel && a.cosine_sampling == b.cosine_sampling &&
+         a.texture_filter == b.texture_filter;
 }
 
 /// Traces the calibration paths through the scene of `view`, whose lights have the initial
@@ -128,6 +145,11 @@ LightProbes trace_probes(const Scene& scene, const EmbreeAccelerator& accel, con
 
 }  // namespace
 
+void LightCalibration::apply(LightView& view) const {
+  tables.apply(view);
+  view.shadow_threshold = shadow_threshold;
+}
+
 LightCalibration calibrate_lights(const Scene& scene, const EmbreeAccelerator& accel,
                                   const SceneView& view, const Settings& settings,
                                   const std::function<bool()>& stopped) {
@@ -135,11 +157,19 @@ LightCalibration calibrate_lights(const Scene& scene, const EmbreeAccelerator& a
   LightCalibration out;
   if (settings.light_weights == LightWeights::kPower || settings.max_depth == 0) return out;
   LightParts parts = divide_lights(scene, view.lights.by_tree);
-  if (parts.size() == 0) return out;
   const LightSet& set = scene.light_set();
   const LightTree& tree = parts.by_tree ? scene.light_tree(settings.threads) : set.tree;
-  const bool has_nodes = parts.by_tree && tree.nodes.size() > 1 && set.size() <= kMaxTilted;
-  if (parts.size() < 2 && !has_nodes) return out;
+  const bool has_nodes =
+      parts.by_tree && parts.size() > 0 && tree.nodes.size() > 1 && set.size() <= kMaxTilted;
+  if (parts.size() < 2 && !has_nodes) {
+    if (!settings.saves_shadow_rays() || view.lights.count == 0) return out;
+    const std::vector<uint32_t> pixels =
+        spread_pixels(settings, path_count(settings) / kBrightnessShare);
+    const LightProbes probes = trace_probes(scene, accel, view, settings, pixels, stopped);
+    out.shadow_threshold = shadow_threshold(ImageTiles(settings, pixels, probes.luminance));
+    out.seconds = seconds_since(start);
+    return out;
+  }
 
   // Mix the probabilities with uniform ones, so that lights of little power are sampled as well.
   std::vector<double> even(parts.size());
@@ -154,6 +184,7 @@ LightCalibration calibrate_lights(const Scene& scene, const EmbreeAccelerator& a
   if (stopped()) return out;
 
   const ImageTiles tiles(settings, pixels, probes.luminance);
+  if (settings.saves_shadow_rays()) out.shadow_threshold = shadow_threshold(tiles);
   std::vector<double> scales;
   if (tiles.is_lit())
     for (const uint32_t pixel : pixels) scales.push_back(tiles.inverse_scale(pixel));

@@ -7,7 +7,8 @@
 /// to the brightness of the image around the pixel, determine the new probabilities
 /// (light/calibration/balance.h). The result does not depend on seed, sampler, samples, region,
 /// threads, waves or lanes, so that crops, resumed renders and merged renders use the same
-/// probabilities.
+/// probabilities. The same paths estimate the brightness of the image, which determines the
+/// threshold of Russian roulette for shadow rays.
 #pragma once
 
 #include <functional>
@@ -23,10 +24,16 @@ namespace wavecomb {
 struct LightCalibration {
   LightParts parts;         ///< empty if there is nothing to calibrate
   CalibratedLights tables;  ///< calibrated probabilities
-  uint32_t paths = 0;
+  /// LightView::shadow_threshold; 0 without Settings::saves_shadow_rays(), or if no path found
+  /// light.
+  float shadow_threshold = 0;
+  uint32_t paths = 0;         ///< number of paths that calibrated the probabilities
   uint32_t tilted_nodes = 0;  ///< number of light tree nodes with changed selection odds
   double seconds = 0;
   bool kept = false;  ///< whether the calibration was taken over from an earlier render
+
+  /// Makes `view` use the results. Contract: after the call, `view` points into this object.
+  void apply(LightView& view) const;
 };
 
 /// Calibrates the lights of `scene` for the size of the whole image, the filter, max_depth and the

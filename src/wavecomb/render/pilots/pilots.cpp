@@ -31,7 +31,7 @@ PilotResults run_pilots(const PilotInput& input, PilotCache& cache) {
   PilotResults found;
   found.lights = cache.lights.get(input.scene, plan.accelerator, plan.view, input.light_settings,
                                   input.stopped);
-  found.lights->tables.apply(view);
+  found.lights->apply(view);
   JointPilot::prepare(*input.scene, context);
   input.costs.start(context, plan.kernels, input.profile, input.halted);
   found.joint = JointPilot::run(*input.scene, plan.waves, input.joint, input.stopped, context);
