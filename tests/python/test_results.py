@@ -15,8 +15,6 @@ from parts import not_here
 
 ROOT = Path(__file__).resolve().parents[2]
 RESULTS = sorted((ROOT / "benchmarks" / "results").glob("*.json"))
-OLD = {"claims", "noise_target"}
-"""Result files that have fewer than five rounds or do not record their command."""
 RECENT = 40
 """Number of commits to src/ after which a result must be measured again."""
 
@@ -35,7 +33,7 @@ def of(path: Path) -> str:
 
 
 def test_there_are_results() -> None:
-    assert {of(path) for path in RESULTS} >= OLD
+    assert RESULTS
 
 
 @pytest.mark.parametrize("path", RESULTS, ids=of)
@@ -49,7 +47,7 @@ def test_commits_are_in_this_repository(path: Path) -> None:
     )
 
 
-@pytest.mark.parametrize("path", [p for p in RESULTS if of(p) not in OLD], ids=of)
+@pytest.mark.parametrize("path", RESULTS, ids=of)
 def test_pages_quote_the_command(path: Path) -> None:
     read = document(path)
     assert read["rounds"] >= 5 and not read.get("changed")
@@ -83,7 +81,7 @@ def test_pages_mark_old_results(path: Path) -> None:
     naming = [part for part in sections() if re.search(rf"\b{re.escape(path.name)}", part)]
     assert naming, f"no page names {path.name}"
     since = git("rev-list", "--count", f"{document(path)['commit']}..HEAD", "--", "src")
-    if of(path) not in OLD and int(since.stdout) <= RECENT:
+    if int(since.stdout) <= RECENT:
         return
     for part in naming:
         assert "measured again" in " ".join(part.lower().split()), (
