@@ -58,6 +58,7 @@ def main() -> None:
     parser.add_argument("--cache", type=Path, default=ROOT / "out" / "peers" / "equal")
     output = ROOT / "benchmarks" / "results" / "peers-equal-time.json"
     parser.add_argument("--output", type=Path, default=output)
+    parser.add_argument("--figure", type=Path, help="SVG of the efficiency on each stage")
     parser.add_argument("--only-references", action="store_true", help="render references only")
     parser.add_argument("--quick", action="store_true", help="small renders, to check that it runs")
     args = parser.parse_args()
@@ -76,6 +77,8 @@ def main() -> None:
             rows[-1] |= measure(name, job, references, seconds, args)
             content = {"size": args.size, "rounds": args.rounds, **commit(), "rows": rows}
             write_result(args.output, "wavecomb-equal-time/1", content | {"machine": machine()})
+    if rows and args.figure:
+        draw(rows, args.renderers[1:], args.figure)
     for seconds in args.seconds if rows else ():
         overall([row for row in rows if row["seconds"] == seconds], args.renderers[1:])
 
@@ -203,6 +206,28 @@ def products(values: dict[str, list[float]], kind: str) -> list[float]:
     return [
         max(error, 1e-9) * took for error, took in zip(values[kind], values["seconds"], strict=True)
     ]
+
+
+def draw(rows: list[dict[str, Any]], others: list[str], path: Path) -> None:
+    """Draw the efficiency relative to each renderer, for the first budget of time."""
+    from matplotlib.figure import Figure
+
+    rows = [row for row in rows if row["seconds"] == rows[0]["seconds"]]
+    chart = Figure(figsize=(7, 0.9 + 0.34 * len(rows)), layout="constrained")
+    axes = chart.subplots()
+    height = 0.8 / len(others)
+    for k, r in enumerate(others):
+        found = [(i, row["efficiency"][r]["of_means"]) for i, row in enumerate(rows)
+                 if r in row["efficiency"]]  # fmt: skip
+        places = [i + (k - (len(others) - 1) / 2) * height for i, _ in found]
+        axes.barh(places, [value for _, value in found], height, label=f"to {r}")
+    axes.axvline(1, color="black", linewidth=0.8)
+    axes.set_xscale("log")
+    axes.set_yticks(range(len(rows)), [row["stage"] for row in rows])
+    axes.invert_yaxis()
+    axes.set_xlabel(f"efficiency of Wavecomb's defaults, {rows[0]['seconds']:g} s per image")
+    axes.legend()
+    chart.savefig(path, metadata={"Date": None})
 
 
 def overall(rows: list[dict[str, Any]], others: list[str]) -> None:

@@ -124,6 +124,10 @@ def test_every_schedule_gives_the_same_bits(says: str, tmp_path: Path) -> None:
     [
         ("bool primvars:wavecomb:visibility:shadow = 0", {"shadow": False}),
         ("int primvars:ri:attributes:visibility:indirect = 0", {"bounces": False}),
+        ("bool primvars:wavecomb:visibility:camera = 0\\n"
+         "int primvars:ri:attributes:visibility:camera = 1\\n"
+         'string primvars:karma:object:rendervisibility = "*"',
+         {"camera": False, "shadow": True, "bounces": True}),
         ("int primvars:ri:attributes:trace:holdout = 1", {"holdout": True}),
         ("int primvars:karma:object:holdoutmode = 2", {"holdout": True}),
         ('string primvars:karma:object:rendervisibility = "-primary"',

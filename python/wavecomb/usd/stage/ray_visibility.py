@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 from pxr import Sdf, Usd
 
@@ -14,11 +14,14 @@ from wavecomb.load_options import LoadOptions
 from wavecomb.usd.stage.context import LoadContext
 from wavecomb.usd.stage.report import LoadReport
 
-_FLAGS = {
+_OWN = {
     "primvars:wavecomb:visibility:camera": "camera",
     "primvars:wavecomb:visibility:shadow": "shadow",
     "primvars:wavecomb:visibility:bounces": "bounces",
     "primvars:wavecomb:holdout": "holdout",
+}
+"""Attributes of Wavecomb, which precede those of other renderers on the same prim."""
+_OTHERS = {
     "primvars:arnold:visibility:camera": "camera",
     "primvars:arnold:visibility:shadow": "shadow",
     "primvars:arnold:matte": "holdout",
@@ -29,7 +32,8 @@ _FLAGS = {
     "primvars:ri:attributes:trace:holdout": "holdout",
     "primvars:ri:attributes:Ri:Matte": "holdout",
 }
-"""Attributes for a single kind of ray; any value other than 0 means visible (or holdout)."""
+"""Attributes for a single kind of ray; any value other than 0 means visible (or holdout), as for
+``_OWN``. If a prim authors the attributes of several renderers, the last entry applies."""
 _ARNOLD_BOUNCES = tuple(
     f"primvars:arnold:visibility:{kind}"
     for kind in ("diffuse_reflect", "specular_reflect", "diffuse_transmit", "specular_transmit")
@@ -44,7 +48,7 @@ _KARMA_KINDS = {
 }
 _BY_KIND = "visibility by kinds of bounces"
 _CATCHER = "primvars:wavecomb:catcher"
-NAMES = frozenset({*_FLAGS, *_ARNOLD_BOUNCES, _KARMA, _CATCHER})
+NAMES = frozenset({*_OWN, *_OTHERS, *_ARNOLD_BOUNCES, _KARMA, _CATCHER})
 """Names of all attributes that this module reads."""
 
 
@@ -77,11 +81,7 @@ def rays_of(prim: Usd.Prim, report: LoadReport | None = None) -> dict[str, bool]
     Keys are "camera", "shadow", "bounces" and "holdout". The report, if given, receives what is not
     supported.
     """
-    rays = {
-        kind: bool(value)
-        for name, kind in _FLAGS.items()
-        if (value := prim.GetAttribute(name).Get()) is not None
-    }
+    rays = _flags(prim, _OTHERS)
     missing: list[str] = []
     bounces = [
         value for name in _ARNOLD_BOUNCES if (value := prim.GetAttribute(name).Get()) is not None
@@ -94,10 +94,20 @@ def rays_of(prim: Usd.Prim, report: LoadReport | None = None) -> dict[str, bool]
     mask = prim.GetAttribute(_KARMA).Get()
     if mask is not None:
         rays |= _karma(str(mask), missing)
+    rays |= _flags(prim, _OWN)
     if report is not None:
         for what in missing:
             report.missing(what, prim.GetPath())
     return rays
+
+
+def _flags(prim: Usd.Prim, names: Mapping[str, str]) -> dict[str, bool]:
+    """Returns the visibility by the attributes in ``names`` that a prim authors."""
+    return {
+        kind: bool(value)
+        for name, kind in names.items()
+        if (value := prim.GetAttribute(name).Get()) is not None
+    }
 
 
 def inherited_rays(prim: Usd.Prim) -> dict[str, bool]:
