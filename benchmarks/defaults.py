@@ -220,7 +220,7 @@ def main() -> None:
     for name in names:
         for spp in options.spp:
             rows += measure(name, options, spp)
-            content = {"size": options.size, "seeds": options.seeds, "rows": rows}
+            content = {"size": options.size, "rounds": options.seeds, "rows": rows}
             write_result(options.output, "wavecomb-defaults/1", content)
 
 
