@@ -184,13 +184,17 @@ TEST(LightCalibration, IsLeftOutWhereThereIsNothingToShare) {
   }
 }
 
-/// Returns the number of shadow rays in an image of a box under lights of `scale` times their
+/// Returns the number of shadow rays in an image of a dark box under lights of `scale` times their
 /// usual radiance: a rect light and, if `dome` is set, a dome.
 uint64_t shadow_rays(const Settings& settings, float scale, bool dome) {
   SceneBuilder b;
-  const uint32_t white = b.add_material(make_material(ProgramId::kDiffuse, {0.6f, 0.6f, 0.6f}));
-  for (const MeshData& m : {ground(10), box({-1, 0, -1}, {1, 2, 1})})
-    b.add_to_group(0, b.add_mesh(make_mesh(m, white, "mesh")));
+  const auto add = [&](const MeshData& m, float albedo) {
+    const uint32_t material =
+        b.add_material(make_material(ProgramId::kDiffuse, Vec3<float>(albedo)));
+    b.add_to_group(0, b.add_mesh(make_mesh(m, material, "mesh")));
+  };
+  add(ground(10), 0.6f);
+  add(box({-2, 0, -2}, {2, 2, 2}), 0.02f);
   b.add_light(
       make_light(LightKind::kRect, Vec3<float>(13 * scale), translate(-3, 9, 4) * rotate(0, -70)));
   if (dome) b.add_light(make_light(LightKind::kDome, Vec3<float>(0.1f * scale)));
