@@ -74,6 +74,7 @@ VALIDATION = {
     "lights-5": Stage("lights", options={"seed": 5, "lights": 1000}),
 }
 STAGES = TUNING | VALIDATION
+SETS = {"@tuning": list(TUNING), "@validation": list(VALIDATION)}
 
 WAYS: dict[str, dict[str, Any]] = {
     "default": {},
@@ -214,8 +215,7 @@ def main() -> None:
     parser.add_argument("--folder", type=Path, default=Path("out/defaults"))
     parser.add_argument("--output", type=Path, default=RESULTS / "defaults.json")
     options = parser.parse_args()
-    sets = {"@tuning": list(TUNING), "@validation": list(VALIDATION)}
-    names = [name for given in options.stages for name in sets.get(given, [given])]
+    names = [name for given in options.stages for name in SETS.get(given, [given])]
     rows: list[dict[str, Any]] = []
     for name in names:
         for spp in options.spp:

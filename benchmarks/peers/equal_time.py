@@ -28,19 +28,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from caustics import samples  # of this folder, not of its parent
+from caustics import picture, samples  # of this folder, not of its parent
 from noise import Picture, rel_errors
 from renderers import RENDERERS, ROOT, Job, Process
-from report import commit, machine
 
 sys.path.insert(0, str(ROOT / "benchmarks"))
-from defaults import STAGES, TUNING, VALIDATION, WAYS
-from sitting import log, ratio, show, stage_file, summary, write_result
+from defaults import SETS, STAGES, WAYS
+from sitting import log, ratio, show, stage_file, write_result
+
+from wavecomb.image.compare.comparison import trimmed_mean
 
 NAMES = ("wavecomb", "mitsuba-llvm-multijitter", "cycles-no-tree")
 BATCH = 256
 """Samples per pixel of one batch of a reference; a square, as multijitter requires."""
-OUTLIERS = 1e-3
 UNLIKE = {
     "candles": "wax with subsurface scattering",
     "drinks": "liquids with media",
@@ -49,7 +49,6 @@ UNLIKE = {
     "fur": "hair",
 }
 """Stages that mitsuba_bridge.py and cycles_bridge.py cannot translate, so images would differ."""
-SETS = {"@tuning": list(TUNING), "@validation": list(VALIDATION)}
 
 
 def main() -> None:
@@ -86,8 +85,8 @@ def main() -> None:
         for seconds in args.seconds:
             rows.append({"stage": name, "seconds": seconds, "missing": reasons})
             rows[-1] |= measure(name, job, references, seconds, args)
-            content = {"size": args.size, "rounds": args.rounds, **commit(), "rows": rows}
-            write_result(args.output, "wavecomb-equal-time/1", content | {"machine": machine()})
+            content = {"size": args.size, "rounds": args.rounds, "rows": rows}
+            write_result(args.output, "wavecomb-equal-time/1", content)
     if rows and args.figure:
         draw(rows, args.renderers[1:], args.figure)
     for seconds in args.seconds if rows else ():
@@ -128,8 +127,8 @@ def converged(
         process = Process(renderer, job, args.cache / f"{renderer}.log", best)
         total, squares = np.zeros(()), np.zeros(())
         for k in range(count):
-            picture, _ = render(process, BATCH, 1000 + k, args)
-            total, squares = total + picture, squares + picture**2
+            image, _ = picture(process, BATCH, 1000 + k, args)
+            total, squares = total + image, squares + image**2
         process.close()
         mean = total / count
         spread = np.maximum(squares / count - mean**2, 0.0) / (count - 1)
@@ -139,25 +138,12 @@ def converged(
     return found["mean"], found["spread"]
 
 
-def render(
-    process: Process, spp: int, seed: int, args: argparse.Namespace
-) -> tuple[Picture, dict[str, Any]]:
-    """Return an image, and the statistics that the renderer reports."""
-    file = args.cache / "picture.npy"
-    answer = process.render(spp, seed, file)
-    return np.load(file).astype(np.float64), answer
-
-
-def errors(picture: Picture, reference: tuple[Picture, Picture]) -> tuple[float, float]:
+def errors(image: Picture, reference: tuple[Picture, Picture]) -> tuple[float, float]:
     """Return the error over all pixels and the trimmed error."""
     mean, spread = reference
-    pixels = rel_errors(picture, mean)
-    noise = np.sort((spread / (mean**2 + 0.01)).mean(axis=2).ravel())
-    kept = round(len(pixels) * (1 - OUTLIERS))
-    return (
-        float(pixels.mean() - noise.mean()),
-        float(pixels[:kept].mean() - noise[:kept].mean()),
-    )
+    pixels = rel_errors(image, mean)
+    noise = (spread / (mean**2 + 0.01)).mean(axis=2)
+    return float(pixels.mean() - noise.mean()), trimmed_mean(pixels) - trimmed_mean(noise)
 
 
 def measure(
@@ -180,9 +166,9 @@ def measure(
     shuffle = random.Random(name)
     for number in range(args.rounds):
         for r in shuffle.sample(list(processes), len(processes)):
-            picture, answer = render(processes[r], spp[r], number, args)
-            error, trimmed = errors(picture, references[r])
-            values = (answer["spp"], answer["seconds"], error, trimmed, picture.mean())
+            image, answer = picture(processes[r], spp[r], number, args)
+            error, trimmed = errors(image, references[r])
+            values = (answer["spp"], answer["seconds"], error, trimmed, image.mean())
             for key, value in zip(found[r], values, strict=True):
                 found[r][key].append(float(value))
     for process in processes.values():
@@ -208,12 +194,11 @@ def measure(
             f"of means {out['efficiency'][r]['of_means']:.2f}, "
             f"trimmed {show(out['trimmed_efficiency'][r], 2)}"
         )
-    out["time"] = {r: summary(values["seconds"]) for r, values in found.items()}
     return out
 
 
 def products(values: dict[str, list[float]], kind: str) -> list[float]:
-    """Return error x seconds of each round; an error below that of the reference counts as 0."""
+    """Return error x seconds of each round; errors are at least 1e-9."""
     return [
         max(error, 1e-9) * took for error, took in zip(values[kind], values["seconds"], strict=True)
     ]

@@ -22,8 +22,8 @@ namespace {
 /// Calibration traces one path for every kPixelsOfPath pixels, within the limits kMinPaths and
 /// kMaxPaths.
 constexpr uint32_t kMaxPaths = 16384, kMinPaths = 1024, kPixelsOfPath = 4;
-/// If there are no probabilities to calibrate, a fraction of the paths suffices to estimate the
-/// brightness of the image.
+/// If there are no probabilities to calibrate, only one of kBrightnessShare paths is traced, which
+/// suffices to estimate the brightness of the image.
 constexpr uint32_t kBrightnessShare = 4;
 /// Contribution below which roulette decides about the shadow ray, relative to the brightness of
 /// the image (docs/decisions/roulette.md).
