@@ -54,6 +54,14 @@ RTCIntersectArguments intersect_arguments(QueryContext& context, const SceneView
   return args;
 }
 
+/// Sets the directions and times of a packet that starts at ray `base`.
+void set_rays(QueryContext& context, const RaySpan& rays, size_t base) {
+  context.dx = rays.dx + base;
+  context.dy = rays.dy + base;
+  context.dz = rays.dz + base;
+  context.time = rays.time ? rays.time + base : nullptr;
+}
+
 uint32_t widest_packet(RTCDevice device) {
   if (rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED)) return 16;
   if (rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED)) return 8;
@@ -128,6 +136,7 @@ struct EmbreeAccelerator::Impl {
       QueryContext context;
       RTCIntersectArguments args =
           intersect_arguments(context, view, keys, first_world, first_light, coherent);
+      set_rays(context, rays, i);
       rh.ray = load_ray(rays, i);
       rh.hit.geomID = RTC_INVALID_GEOMETRY_ID;
       rh.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
@@ -186,6 +195,7 @@ struct EmbreeAccelerator::Impl {
     context.prim = rh.hit.primID;
     for (size_t base = 0; base < rays.size; base += W) {
       const size_t n = std::min<size_t>(W, rays.size - base);
+      set_rays(context, rays, base);
       load_rays<W>(rh.ray, valid, rays, base, n);
       for (uint32_t i = 0; i < W; ++i) {
         rh.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
@@ -209,11 +219,13 @@ struct EmbreeAccelerator::Impl {
   }
 
   template <uint32_t W>
-  void occluded_packets(const RaySpan& rays, uint32_t* out, RTCOccludedArguments& args) const {
+  void occluded_packets(const RaySpan& rays, uint32_t* out, QueryContext& context,
+                        RTCOccludedArguments& args) const {
     alignas(64) typename PacketTypes<W>::Ray ray;
     alignas(64) int valid[W];
     for (size_t base = 0; base < rays.size; base += W) {
       const size_t n = std::min<size_t>(W, rays.size - base);
+      set_rays(context, rays, base);
       load_rays<W>(ray, valid, rays, base, n);
       if constexpr (W == 16)
         rtcOccluded16(valid, top, &ray, &args);
@@ -308,15 +320,16 @@ void EmbreeAccelerator::occluded(const RaySpan& rays, uint32_t* occluded, uint32
   args.context = &context.base;
   switch (impl_->packet(width, coherent, keys)) {
     case 16:
-      return impl_->occluded_packets<16>(rays, occluded, args);
+      return impl_->occluded_packets<16>(rays, occluded, context, args);
     case 8:
-      return impl_->occluded_packets<8>(rays, occluded, args);
+      return impl_->occluded_packets<8>(rays, occluded, context, args);
     case 4:
-      return impl_->occluded_packets<4>(rays, occluded, args);
+      return impl_->occluded_packets<4>(rays, occluded, context, args);
     default:
       break;
   }
   for (size_t i = 0; i < rays.size; ++i) {
+    set_rays(context, rays, i);
     RTCRay ray = Impl::load_ray(rays, i);
     rtcOccluded1(impl_->top, &ray, &args);
     occluded[i] = ray.tfar < 0.f ? 1 : 0;

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 
+#include "wavecomb/core/math.h"
 #include "wavecomb/scene/scene_view.h"
 
 struct RTCSceneTy;  // Embree's scene type
@@ -43,10 +44,9 @@ inline U object_of(const U& inst, const U& mesh) {
   return U(inst * 0x9e3779b1u) + mesh;
 }
 
-/// Data of each path for the random decision whether a partially transparent surface (opacity
-/// between 0 and 1) stops a ray. The random number is a hash of the path's sample and the
-/// primitive, so that it does not depend on the order of traversal. The arrays are indexed by path
-/// slot.
+/// Data of each path for the decision whether a partly transparent surface stops a ray. The random
+/// number depends on the path's sample and the primitive, so that it does not depend on the order
+/// of traversal. The arrays are indexed by path slot.
 struct PresenceKeys {
   const uint32_t* pixel_hash = nullptr;
   const uint32_t* sample = nullptr;
@@ -68,7 +68,25 @@ struct PresenceKeys {
   /// same as for `pixel_hash`. Rays that are restricted to an object hit no lights. Null means that
   /// rays can hit all objects.
   const uint32_t* object = nullptr;
+  /// Whether rays pass surfaces that transmit straight. If not, such surfaces are opaque, as for
+  /// picking.
+  bool passes_straight = false;
+  /// For each slot, the optical depth of its shadow ray in units of log(2) / kOpticalDepthUnit, to
+  /// which occlusion queries add -log2 of the fraction of light that each partly transparent
+  /// surface lets pass. The sum is undefined for blocked rays. If null, partly transparent surfaces
+  /// stop rays at random.
+  uint32_t* optical_depth = nullptr;
 };
+inline constexpr float kOpticalDepthUnit = 65536.f;
+/// Optical depth above which a shadow ray is blocked: a transmittance of 2^-32.
+inline constexpr uint32_t kOpaqueDepth = 32u << 16;
+
+/// Returns the fraction of light that an unblocked shadow ray with PresenceKeys::optical_depth
+/// `depth` lets pass.
+template <typename F>
+inline F surface_transmittance(const UInt<F>& depth) {
+  return exp(F(F(depth) * (-0.693147181f / kOpticalDepthUnit)));
+}
 
 /// Rule for the choice among hits at the same distance.
 enum class HitRule : uint8_t {

@@ -40,13 +40,17 @@ void for_hits(const Arguments& args, RTCRayN* rays, CurveQuery query, const Want
     const auto intersect = [&](const SubSegment& sub_segment) {
       for (const CurveHit& hit : intersect_curve(*curves.mesh, sub_segment, *ray, tfar, query,
                                                  RTCRayN_time(rays, n, i), curves.is_fibre)) {
-        if (curves.is_filtered && !is_met_by_embree_ids(*context, {.instance = inst,
-                                                                   .geom = args.geomID,
-                                                                   .mesh = curves.id,
-                                                                   .prim = sub_segment.prim,
-                                                                   .u = hit.u,
-                                                                   .v = hit.v,
-                                                                   .slot = RTCRayN_id(rays, n, i)}))
+        if (curves.is_filtered && !is_met_by_embree_ids(*context,
+                                                        {.instance = inst,
+                                                         .geom = args.geomID,
+                                                         .mesh = curves.id,
+                                                         .prim = sub_segment.prim,
+                                                         .u = hit.u,
+                                                         .v = hit.v,
+                                                         .slot = RTCRayN_id(rays, n, i),
+                                                         .dir = {},
+                                                         .time = 0.f},
+                                                        i))
           continue;
         found(i, sub_segment.prim, hit);
         break;

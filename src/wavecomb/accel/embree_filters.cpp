@@ -73,8 +73,10 @@ float intersect_light_shape(const LightGeometry& light, RTCRayN* ray, unsigned n
 
 }  // namespace
 
-bool is_met_by_embree_ids(const QueryContext& context, const PresenceQuery& at) {
+bool is_met_by_embree_ids(const QueryContext& context, const PresenceQuery& at, unsigned i) {
   PresenceQuery in_scene = at;
+  in_scene.dir = {context.dx[i], context.dy[i], context.dz[i]};
+  in_scene.time = context.time ? context.time[i] : 0.f;
   if (at.instance == RTC_INVALID_GEOMETRY_ID) {
     in_scene.instance = 0;
     in_scene.geom = at.geom - context.first_world;
@@ -88,14 +90,17 @@ void presence_filter(const RTCFilterFunctionNArguments* args) {
   const unsigned n = args->N;
   for (unsigned i = 0; i < n; ++i) {
     if (args->valid[i] != -1) continue;
-    const bool present =
-        is_met_by_embree_ids(*context, {.instance = RTCHitN_instID(args->hit, n, i, 0),
-                                        .geom = RTCHitN_geomID(args->hit, n, i),
-                                        .mesh = mesh,
-                                        .prim = RTCHitN_primID(args->hit, n, i),
-                                        .u = RTCHitN_u(args->hit, n, i),
-                                        .v = RTCHitN_v(args->hit, n, i),
-                                        .slot = RTCRayN_id(args->ray, n, i)});
+    const bool present = is_met_by_embree_ids(*context,
+                                              {.instance = RTCHitN_instID(args->hit, n, i, 0),
+                                               .geom = RTCHitN_geomID(args->hit, n, i),
+                                               .mesh = mesh,
+                                               .prim = RTCHitN_primID(args->hit, n, i),
+                                               .u = RTCHitN_u(args->hit, n, i),
+                                               .v = RTCHitN_v(args->hit, n, i),
+                                               .slot = RTCRayN_id(args->ray, n, i),
+                                               .dir = {},
+                                               .time = 0.f},
+                                              i);
     if (!present) args->valid[i] = 0;
   }
 }

@@ -24,6 +24,8 @@ struct alignas(64) QueryContext {
   /// Embree geometry ids of the first mesh in world space and of the first light.
   uint32_t first_world, first_light;
   const unsigned *inst, *geom, *prim;  ///< ids of the closest hits so far, one value per ray
+  const float *dx, *dy, *dz;           ///< directions of the rays in world space, one per ray
+  const float* time;                   ///< shutter times, one per ray; null means 0
   alignas(64) float t[16];             ///< exact distances of the closest hits so far
   std::optional<CurveRay> curve_ray;   ///< ray of the last curve test; the next test may reuse it
 };
@@ -32,8 +34,9 @@ struct alignas(64) QueryContext {
 /// hits at the same distance.
 inline constexpr float kSlack = 1.f + 0x1p-20f;
 
-/// Calls `accepts_hit` for a point whose instance and geometry are given by Embree's ids.
-bool is_met_by_embree_ids(const QueryContext& context, const PresenceQuery& at);
+/// Calls `accepts_hit` for ray `i` of the packet and a point whose instance and geometry are given
+/// by Embree's ids. `at` has neither direction nor time.
+bool is_met_by_embree_ids(const QueryContext& context, const PresenceQuery& at, unsigned i);
 
 /// Filter function for the meshes that `filtered_meshes` marks. It rejects hits for which
 /// `accepts_hit` returns false. The geometry's user pointer holds the mesh index.

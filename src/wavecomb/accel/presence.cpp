@@ -2,12 +2,15 @@
 #include "wavecomb/accel/presence.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "wavecomb/core/encoding/hash.h"
+#include "wavecomb/core/sampler.h"
 #include "wavecomb/geometry/gaussian_splat/gaussian_splat.h"
 #include "wavecomb/geometry/hit/hit_material.h"
 #include "wavecomb/geometry/hit/uv.h"
 #include "wavecomb/material/inputs/presence.h"
+#include "wavecomb/material/lobes/straight_transmission.h"
 #include "wavecomb/scene/scene.h"
 
 namespace wavecomb {
@@ -25,15 +28,26 @@ void mark_invisible(const Scene& scene, std::vector<uint8_t>& filtered) {
   }
 }
 
-/// Decides at random whether a surface stops a ray. The probability is `opacity`, and the random
-/// number is a hash of the path and the primitive.
-bool is_present_sample(float opacity, const PresenceQuery& at, const PresenceKeys& keys) {
-  if (opacity >= 1.f) return true;
-  if (!(opacity > 0.f)) return false;
-  const uint32_t path =
-      hash_u32(keys.pixel_hash[at.slot * keys.stride], keys.sample[at.slot * keys.stride]);
+/// Decides at random whether a surface stops a ray, with the given probability.
+bool stops_at_random(float probability, const PresenceQuery& at, const PresenceKeys& keys) {
+  if (probability >= 1.f) return true;
+  if (!(probability > 0.f)) return false;
+  const SampleKey<float> path{keys.pixel_hash[size_t{at.slot} * keys.stride],
+                              keys.sample[size_t{at.slot} * keys.stride]};
   const uint32_t where = hash_u32(at.instance * 0x9e3779b9u + at.mesh, at.prim);
-  return unit_float<float>(hash_u32(hash_u32(path, keys.salt), where)) < opacity;
+  return stratified_1d<float>(path, hash_u32(where, keys.salt)) < probability;
+}
+
+/// Returns whether a surface stops a ray that it stops with the given probability on average. A
+/// shadow ray with an optical depth passes, and its optical depth increases. The sums are integers,
+/// so that they do not depend on the order of hits.
+bool stops(float probability, const PresenceQuery& at, const PresenceKeys& keys) {
+  if (!keys.optical_depth) return stops_at_random(probability, at, keys);
+  if (probability >= 1.f) return true;
+  if (!(probability > 0.f)) return false;
+  uint32_t& sum = keys.optical_depth[at.slot];
+  sum += static_cast<uint32_t>(-std::log2(1.f - probability) * kOpticalDepthUnit + 0.5f);
+  return sum > kOpaqueDepth;
 }
 
 const GaussianSplatRow& gaussian_splat_of(const SceneView& scene, uint32_t mesh, uint32_t prim) {
@@ -53,7 +67,8 @@ std::vector<uint8_t> filtered_meshes(const Scene& scene) {
   const MeshMediaView& nested_media = scene.view().nested_media;
   if (!scene.view().has_presence && !nested_media.media) return filtered;
   const auto needs = [&](uint32_t m) {
-    return scene.material_part()->shaded[m].needs_presence() || nested_media.is_bound(m);
+    const Material& material = scene.material_part()->shaded[m];
+    return material.needs_presence() || material.transmits_straight() || nested_media.is_bound(m);
   };
   const auto& instances = geometry.instance_records;
   const bool inherited = std::any_of(instances.begin(), instances.end(),
@@ -102,14 +117,20 @@ bool casts_shadow(const SceneView& scene, uint32_t instance, uint32_t geom, uint
 
 bool is_present(const SceneView& scene, const PresenceQuery& at, const PresenceKeys& keys) {
   if (scene.has_curves && (scene.meshes[at.mesh].flags & kIsGaussianSplat) != 0)
-    return is_present_sample(
+    return stops_at_random(
         gaussian_splat_alpha(gaussian_splat_of(scene, at.mesh, at.prim), at.u, at.v), at, keys);
   const uint32_t material =
       hit_material<float>(scene, scene.instances[at.instance].material, at.mesh, at.prim, true);
   // Medium boundaries do not stop shadow rays. The transmittance of a shadow ray is computed
   // separately (medium/nested/nested_media.h).
   if (keys.ray_kind == kVisibleToShadowRays && scene.nested_media.is_bound(material)) return false;
-  if (!has_presence<float>(scene.materials, material, true)) return true;
+  const uint32_t flags = scene.materials.materials[material].flags;
+  if (keys.passes_straight && (flags & kTransmitsStraight) != 0) {
+    const MeshHit<float> hit{at.instance, at.mesh, at.prim, at.u, at.v, at.time};
+    const auto straight = straight_transmission<float>(scene, hit, material, at.dir, true);
+    return stops(1.f - straight.probability, at, keys);
+  }
+  if ((flags & kPresence) == 0) return true;
   const float opacity =
       opacity_at<float>(scene.materials, scene.meshes, scene.instances,
                         {.material = material,
@@ -117,7 +138,7 @@ bool is_present(const SceneView& scene, const PresenceQuery& at, const PresenceK
                          .mesh_position = {at.mesh, at.prim, at.u, at.v},
                          .uv = hit_uv<float>(scene.meshes, at.mesh, at.prim, at.u, at.v, true)},
                         true);
-  return is_present_sample(opacity, at, keys);
+  return stops(opacity, at, keys);
 }
 
 bool accepts_hit(const SceneView& scene, const PresenceQuery& at, const PresenceKeys& keys) {

@@ -17,19 +17,25 @@ struct PresenceQuery {
   uint32_t instance;  ///< 0 for the world
   uint32_t geom;      ///< index of the geometry within the instance's group
   uint32_t mesh, prim;
-  float u, v;     ///< position on the primitive; for triangles, barycentric coordinates
-  uint32_t slot;  ///< slot of the path, an index into the arrays of `PresenceKeys`
+  float u, v;       ///< position on the primitive; for triangles, barycentric coordinates
+  uint32_t slot;    ///< slot of the path, an index into the arrays of `PresenceKeys`
+  Vec3<float> dir;  ///< direction of the ray
+  float time;       ///< shutter time of the ray
 };
 
-/// Returns whether a surface stops a ray. Surfaces of opacity 1 always do, and surfaces of opacity
-/// 0 never. Otherwise, the decision is random with the opacity as probability. The random number is
-/// a hash of the path, ray, instance and primitive, so that it depends neither on packets nor on
-/// the order of traversal. Does not read `geom`.
+/// Returns whether a surface stops a ray. The surface stops all rays if its presence is 1 and it
+/// does not transmit straight (material/lobes/straight_transmission.h), and none if its presence is
+/// 0. Otherwise, the decision is random, with the probability presence * (1 - transmission). The
+/// random number depends on the path, ray, instance and primitive, so that it depends neither on
+/// packets nor on the order of traversal, and is stratified over the samples of a pixel. Shadow
+/// rays with PresenceKeys::optical_depth pass surfaces that would stop only some rays. Does not
+/// read `geom`.
 bool is_present(const SceneView& scene, const PresenceQuery& at, const PresenceKeys& keys);
 
 /// Returns one value per mesh: 1 if hits on the mesh must be filtered, else 0. Hits must be
-/// filtered if the mesh is partially transparent or invisible to some rays in at least one
-/// instance, bounds a medium, or consists of Gaussian splats, or if the scene has light linking.
+/// filtered if the mesh may let rays pass by its opacity or is invisible to some rays in at least
+/// one instance, bounds a medium, or consists of Gaussian splats, or if the scene has light
+/// linking.
 std::vector<uint8_t> filtered_meshes(const Scene& scene);
 
 /// Returns one value per mesh: 1 for curves and points that have only hair materials in all

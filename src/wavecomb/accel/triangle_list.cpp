@@ -109,7 +109,9 @@ struct ListTracer {
                              .prim = list.ids_.prim[entry],
                              .u = lane(u, i),
                              .v = lane(v, i),
-                             .slot = slot},
+                             .slot = slot,
+                             .dir = {rays.dx[base + i], rays.dy[base + i], rays.dz[base + i]},
+                             .time = rays.time ? rays.time[base + i] : 0.f},
                             keys);
     }
     return in & Mask<F>(load<UInt<F>>(keep.data()) != UInt<F>(0u));

@@ -158,4 +158,15 @@ WAVECOMB_INLINE Sample4<F> sample_4d(SamplerKind kind, const SampleKey<F>& key, 
                                      : detail::independent_4d<F>(key, set);
 }
 
+/// Returns a value in [0, 1) for the decision `name` of a path. Over the samples of a pixel, the
+/// values of one decision are stratified, and those of different decisions are independent.
+template <typename F>
+inline F stratified_1d(const SampleKey<F>& key, const UInt<F>& name) {
+  using U = UInt<F>;
+  const U seed = hash_u32<U>(key.pixel_hash ^ 0x3c6ef372u, name);
+  const U index = reverse_bits<U>(detail::laine_karras<U>(reverse_bits<U>(key.sample), seed)) &
+                  ((1u << detail::kIndexBits) - 1u);
+  return detail::scrambled<F>(index, hash_u32<U>(seed ^ 0x1u));
+}
+
 }  // namespace wavecomb

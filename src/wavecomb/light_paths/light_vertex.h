@@ -100,7 +100,7 @@ WAVECOMB_INLINE LightPathPoint<Bsdf, F, Interaction> light_path_point(const Vert
       at.unadjusted_frame(v),
       {},
       F(1.f / select(cosine > 0.f, cosine, F(1.f))),
-      select<F>(is_first, v.path.throughput, at.throughput),
+      Bsdf::kAbsorbs ? select<F>(is_first, v.path.throughput, at.throughput) : at.throughput,
       F(0.f),
       F(0.f),
       Mask<F>(false),

@@ -45,6 +45,8 @@ struct BsdfTraits {
   static constexpr bool kHasNonDelta = true;
   /// Whether non-delta lobes may transmit to the other side of the surface.
   static constexpr bool kTransmits = false;
+  /// Whether ray traversal may let light pass straight (lobes/straight_transmission.h).
+  static constexpr bool kTransmitsStraight = false;
   /// Whether the program has subsurface random walks; if so, the class has `enters(wo, wi)`.
   static constexpr bool kHasSubsurface = false;
   /// Whether ray origins are offset to hide artefacts at the shadow terminator.

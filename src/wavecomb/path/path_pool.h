@@ -130,14 +130,16 @@ class PathPool {
  public:
   PathPool() = default;
   /// Allocates `capacity` slots. Each flag adds an optional row: `cold` adds PathColdRow, `nested`
-  /// adds MediumStackRow, `shaded` adds VertexResult::shadow_tint, and `split` adds
-  /// PathState::diffuse.
-  PathPool(size_t capacity, bool cold, bool nested = false, bool shaded = false, bool split = false)
+  /// adds MediumStackRow, `shaded` adds VertexResult::shadow_tint, `split` adds PathState::diffuse,
+  /// and `clear` adds optical depths.
+  PathPool(size_t capacity, bool cold, bool nested = false, bool shaded = false, bool split = false,
+           bool clear = false)
       : rows_(1, capacity * (kRowWords<PathRow> + kRowWords<ShadowRow> + kRadianceWords)),
         cold_(cold ? SoaBlock(1, capacity * kRowWords<PathColdRow>) : SoaBlock()),
         medium_stacks_(nested ? SoaBlock(1, capacity * kRowWords<MediumStackRow>) : SoaBlock()),
         shadow_tints_(shaded ? SoaBlock(1, capacity * kRadianceWords) : SoaBlock()),
-        diffuse_(split ? SoaBlock(1, capacity * kRadianceWords) : SoaBlock()) {
+        diffuse_(split ? SoaBlock(1, capacity * kRadianceWords) : SoaBlock()),
+        optical_depths_(clear ? SoaBlock(1, capacity) : SoaBlock()) {
     paths = rows_.floats(0);
     shadows = paths + capacity * kRowWords<PathRow>;
     radiance = shadows + capacity * kRowWords<ShadowRow>;
@@ -145,6 +147,7 @@ class PathPool {
     medium_stacks = nested ? medium_stacks_.floats(0) : nullptr;
     shadow_tints = shaded ? shadow_tints_.floats(0) : nullptr;
     diffuse = split ? diffuse_.floats(0) : nullptr;
+    optical_depths = clear ? optical_depths_.uints(0) : nullptr;
   }
 
   /// PathRow of each slot, or a row of the joint transport, which has the same size.
@@ -158,13 +161,15 @@ class PathPool {
   /// RadianceRow with PathState::diffuse of each slot; null if no light has diffuse or specular
   /// multipliers
   float* diffuse = nullptr;
+  /// PresenceKeys::optical_depth of each slot; null without partly transparent surfaces
+  uint32_t* optical_depths = nullptr;
   size_t bytes() const {
     return rows_.bytes() + cold_.bytes() + medium_stacks_.bytes() + shadow_tints_.bytes() +
-           diffuse_.bytes();
+           diffuse_.bytes() + optical_depths_.bytes();
   }
 
  private:
-  SoaBlock rows_, cold_, medium_stacks_, shadow_tints_, diffuse_;
+  SoaBlock rows_, cold_, medium_stacks_, shadow_tints_, diffuse_, optical_depths_;
 };
 
 /// Adds `c` to the rows of `radiance` with the indices `row`, in active lanes. The indices must

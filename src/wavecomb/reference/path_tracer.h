@@ -193,10 +193,11 @@ class PathTracer : PathRecorder {
                     uint32_t group) {
     clock_.enter(Phase::kShadow);
     const bool links = context_.scene.lights.links.members != nullptr;
-    const bool is_free = !rays_.occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth,
-                                         links ? &v.shadow_set : nullptr);
-    if (is_free || max_component(v.shadow_tint) > 0.f) add_direct(key, depth, v, is_free, group);
-    return is_free;
+    const float passed = rays_.unoccluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth,
+                                          links ? &v.shadow_set : nullptr);
+    if (passed > 0.f || max_component(v.shadow_tint) > 0.f)
+      add_direct(key, depth, v, passed, group);
+    return passed > 0.f;
   }
 
   /// Runs the subsurface random walk of a ray that has entered a body. A ray that does not hit the
@@ -236,11 +237,12 @@ class PathTracer : PathRecorder {
 
   /// Adds the contribution of the light sample in `v` to the light group `group`. Volumes always
   /// attenuate the contribution. Media inside meshes attenuate the contribution only if the shadow
-  /// ray is free. If an object blocks the shadow ray, the contribution is multiplied by
-  /// `v.shadow_tint`.
-  void add_direct(const SampleKey<F>& key, uint32_t depth, const VertexResult<F>& v, bool is_free,
+  /// ray is free. `passed` is the result of SingleRays::unoccluded(). If it is 0, the contribution
+  /// is multiplied by `v.shadow_tint`.
+  void add_direct(const SampleKey<F>& key, uint32_t depth, const VertexResult<F>& v, float passed,
                   uint32_t group) {
-    Color<F> c = v.direct;
+    const bool is_free = passed > 0.f;
+    Color<F> c = is_free ? v.direct * passed : v.direct;
     if constexpr (Media::kAny) {
       const F t = v.shadow_tfar * (1.f / kShadowRayFraction);
       c = c * media_.template transmittance<F>(

@@ -28,6 +28,7 @@ class SingleRays {
   /// Starts a path with `key`, which must outlive its rays, at shutter time `time`.
   void begin(const SampleKey<float>& key, float time) {
     keys_ = {&key.pixel_hash, &key.sample, 1, 0};
+    keys_.passes_straight = true;
     time_ = time;
   }
   float time() const { return time_; }
@@ -42,6 +43,7 @@ class SingleRays {
     keys_.ray_kind = ray_kind(depth, false);
     keys_.bounce_pdf = bounce_pdf;
     keys_.shadow_set = nullptr;
+    keys_.optical_depth = nullptr;
     context_.accel->intersect(span(o, d, tfar), {&h.t, &h.u, &h.v, &h.prim, &h.geom, &h.inst}, 1,
                               false, keys_);
     counts_.add_rays(depth, 1);
@@ -49,18 +51,22 @@ class SingleRays {
     return h;
   }
 
-  /// Returns whether a shadow ray is blocked. `shadow_set` is VertexResult::shadow_set, or null.
-  bool occluded(const Vec3<float>& o, const Vec3<float>& d, float tfar, uint32_t depth,
-                const uint32_t* shadow_set) {
-    uint32_t blocked = 0;
+  /// Returns the fraction of the light that reaches the end of a shadow ray: 0 if the ray is
+  /// blocked, and the transmittance of partly transparent surfaces otherwise. `shadow_set` is
+  /// VertexResult::shadow_set, or null.
+  float unoccluded(const Vec3<float>& o, const Vec3<float>& d, float tfar, uint32_t depth,
+                   const uint32_t* shadow_set) {
+    uint32_t blocked = 0, optical_depth = 0;
     keys_.salt = 2 * depth + 1;
     keys_.ray_kind = ray_kind(depth, true);
     keys_.bounce_pdf = nullptr;
     keys_.shadow_set = shadow_set;
+    keys_.optical_depth = &optical_depth;
     context_.accel->occluded(span(o, d, tfar), &blocked, 1, false, keys_);
     counts_.add_shadow_rays(depth, 1);
+    keys_.optical_depth = nullptr;
     charge();
-    return blocked != 0;
+    return blocked != 0 ? 0.f : surface_transmittance<float>(optical_depth);
   }
 
   uint32_t mesh_of(const SingleHit& hit) const {

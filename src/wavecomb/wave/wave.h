@@ -88,7 +88,7 @@ struct Wave {
   Wave(uint32_t capacity, const WaveContext& context)
       : pool(capacity, context.moves() || context.links() || context.uses_pixel_importance(),
              context.has_medium_stack(), context.scene.lights.shadows != nullptr,
-             context.scene.lights.has_multipliers),
+             context.scene.lights.has_multipliers, context.scene.has_presence),
         aovs(capacity, context.film->aovs().layout(), context.aovs),
         history(capacity, context.stored_vertices()),
         rays(capacity),

@@ -34,13 +34,15 @@ class LightJointTracer {
     if (!(max_component(target.row.light) > 0.f)) return;
     worker_.clock.enter(Phase::kShade);
     const auto from = load_row<LightPathRow, F>(light_.vertices.paths, kOnlySlot, true);
-    const VertexResult<F> v = shade(depth, rays, from, target);
+    VertexResult<F> v = shade(depth, rays, from, target);
     if (!v.has_shadow) return;
     worker_.clock.enter(Phase::kShadow);
     const uint32_t no_set = 0;
     const bool links = context_.scene.lights.links.members != nullptr;
-    if (rays.occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth, links ? &no_set : nullptr))
-      return;
+    const float passed =
+        rays.unoccluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth, links ? &no_set : nullptr);
+    if (passed == 0.f) return;
+    v.direct = v.direct * passed;
     worker_.events(context_).light<Technique::kConnection, F>(
         {depth, kOnlySlot, v.direct}, [&] { return from.light; }, true);
     light_.aovs.connect<F>(worker_.aovs.expressions(), kOnlySlot, v.direct, true);

@@ -66,8 +66,11 @@ class LightTracer {
         store_vertex({depth, light_path_row<F>(path, light, start.key)}, hit, mesh, material, out);
       if (v.has_shadow) {
         clock_.enter(Phase::kShadow);
-        if (!rays_.occluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth, nullptr))
-          add_contribution(pixel, sample, {depth, light_path_row<F>(path, light, start.key)}, out);
+        const float passed =
+            rays_.unoccluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth, nullptr);
+        if (passed > 0.f)
+          add_contribution(pixel, sample, {depth, light_path_row<F>(path, light, start.key)}, out,
+                           v.direct * passed);
       }
       if (!v.alive) return;
       path = v.next;
@@ -83,21 +86,17 @@ class LightTracer {
   };
 
   void add_contribution(uint32_t pixel, uint32_t sample, const Arrival& at,
-                        const LightVertexResult<F>& out) {
+                        const LightVertexResult<F>& out, const Color<F>& c) {
     if (context_.joint.aim_samples) {
-      context_.joint.aim_samples->add(light_path_number(*context_.settings, pixel), at.depth,
-                                      out.v.direct);
+      context_.joint.aim_samples->add(light_path_number(*context_.settings, pixel), at.depth, c);
       return;
     }
     const LightSplatPoint point = light_splat_point(at.path.key, at.depth, out.x, out.y);
-    add_light_splat(context_, buffers_.splats, sample, point, out.v.direct);
+    add_light_splat(context_, buffers_.splats, sample, point, c);
     if (buffers_.aovs)
-      buffers_.aovs.add_to_film(*context_.film, *context_.joint.filter,
-                                {.slot = kOnlySlot,
-                                 .depth = at.depth,
-                                 .light = at.path.light,
-                                 .at = point,
-                                 .c = out.v.direct});
+      buffers_.aovs.add_to_film(
+          *context_.film, *context_.joint.filter,
+          {.slot = kOnlySlot, .depth = at.depth, .light = at.path.light, .at = point, .c = c});
   }
 
   void store_vertex(const Arrival& at, const SingleHit& hit, uint32_t mesh, uint32_t material,

@@ -199,8 +199,7 @@ bool focuses_light(const Scene& scene) {
     const bool varies = m.graph != kNoGraph;
     if (has_trait(m.program, program_trait::kGlass)) return true;
     if (!has_trait(m.program, program_trait::kGlossy)) return false;
-    const bool passes = (m.opacity < 1 && !m.presence && m.opacity_threshold <= 0) ||
-                        m.openpbr.transmission_weight > 0;
+    const bool passes = m.openpbr.transmission_weight > 0;
     const bool coats = m.clearcoat > 0 || m.has_texture(Input::kClearcoat);
     return varies || passes || is_sharp(m.roughness, m.has_texture(Input::kRoughness)) ||
            (coats && is_sharp(m.clearcoat_roughness, m.has_texture(Input::kClearcoatRoughness)));

@@ -99,6 +99,11 @@ struct Material {
     return (presence || opacity_threshold > 0) &&
            (opacity < 1 || opacity < opacity_threshold || opacity_varies());
   }
+  /// Returns whether light may pass straight through the surface because its opacity is below 1.
+  bool transmits_straight() const {
+    return has_trait(program, program_trait::kTransmitsByOpacity) && !presence &&
+           !(opacity_threshold > 0) && (opacity < 1 || opacity_varies());
+  }
   /// Returns whether opacity varies over surfaces with this material.
   bool opacity_varies() const { return has_texture(Input::kOpacity) || opacity_graph != kNoGraph; }
 };
@@ -129,6 +134,7 @@ enum MaterialFlags : uint32_t {
   kConductorIndex = 4,
   kEmits = 8,
   kHasGraph = 16,
+  kTransmitsStraight = 32,
 };
 /// Packed TextureUse of 64 bytes.
 struct alignas(64) TextureUseRecord {

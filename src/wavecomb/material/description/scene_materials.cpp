@@ -36,6 +36,7 @@ MaterialRecord make_material_record(const Material& m, const GraphSet& graphs) {
     if (m.has_texture(static_cast<Input>(s))) r.textured_inputs |= 1u << s;
   if (m.specular_workflow) r.flags |= kSpecularWorkflow;
   if (m.needs_presence()) r.flags |= kPresence;
+  if (m.transmits_straight()) r.flags |= kTransmitsStraight;
   if (m.conductor_k.x > 0 || m.conductor_k.y > 0 || m.conductor_k.z > 0) r.flags |= kConductorIndex;
   if (m.emits()) r.flags |= kEmits;
   r.program = static_cast<uint32_t>(m.program);
@@ -136,7 +137,7 @@ SceneMaterials::SceneMaterials(std::vector<Material> all, std::shared_ptr<const 
     variants.push_back(cheapest_variant(
         m.program, parts_of(m, *graphs, textures, exit_material != kInheritMaterial)));
     wants_tangents.push_back(wavecomb::wants_tangents(m, *graphs) ? 1 : 0);
-    has_presence = has_presence || m.needs_presence();
+    has_presence = has_presence || m.needs_presence() || m.transmits_straight();
     has_emission = has_emission || m.emits();
     has_absorbing_graphs = has_absorbing_graphs || absorbs_by_graph(m, *graphs);
   }

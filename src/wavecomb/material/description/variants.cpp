@@ -31,12 +31,7 @@ uint32_t parts_of(const Material& m, const GraphSet& graphs, std::span<const Tex
   add(kMetalPart,
       m.specular_workflow || above_0("metallic", effective(Input::kMetallic, m.metallic)));
   add(kCoatPart, above_0("clearcoat", effective(Input::kClearcoat, m.clearcoat)));
-  if (has_trait(m.program, program_trait::kTransmitsByOpacity)) {
-    // Opacity as presence is handled by ray traversal, not by the BSDF.
-    const bool is_presence = m.opacity_threshold > 0 || (m.presence && m.needs_presence());
-    add(kTransmissionPart,
-        !is_presence && may_pass("opacity", 1, m.opacity != 1 || m.opacity_varies()));
-  }
+  add(kTransmissionPart, m.transmits_straight() && may_pass("opacity", 1, true));
   if (has_trait(m.program, program_trait::kLayered)) {
     const OpenPbr& o = m.openpbr;
     add(kTransmissionPart, above_0("transmission_weight", o.transmission_weight != 0));

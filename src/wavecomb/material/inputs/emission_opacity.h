@@ -49,6 +49,22 @@ inline Color<F> fetch_emission(const MaterialView& view, const UInt<F>& material
   return fetch_emission<F>(view, material, uv, footprint, detail::UvOnly<F>{uv, footprint}, active);
 }
 
+/// Returns the opacity of the material at `uv`, from 0 to 1, regardless of its meaning.
+/// `make_point(active)` returns the inputs of the graph, and is called only if there is a graph.
+template <typename F, typename MakePoint>
+inline F material_opacity(const MaterialView& view, const UInt<F>& material, const Vec2<F>& uv,
+                          const Footprint<F>& footprint, const MakePoint& make_point,
+                          const Mask<F>& active) {
+  const detail::InputReader<F> inputs(view, material, uv, footprint, active);
+  const F opacity =
+      detail::saturate(inputs.value(Input::kOpacity, inputs.record[&MaterialRecord::opacity]));
+  const UInt<F> graph = inputs.record[&MaterialRecord::opacity_graph];
+  const Mask<F> driven = active & Mask<F>(graph != UInt<F>(kNoGraph));
+  if (none(driven)) return opacity;
+  return graph_value<F>(view, graph, kOpacityOutput, make_point(driven), driven, Vec3<F>(opacity))
+      .x;
+}
+
 /// Returns the presence of the surface at `uv`, the probability that a ray hits it. With an opacity
 /// threshold, presence is 0 or 1. If opacity means transparency, presence is 1 and the shading
 /// program handles the transparency. `make_point(active)` returns the inputs of the graph, and is
@@ -57,15 +73,9 @@ template <typename F, typename MakePoint>
 inline F fetch_opacity(const MaterialView& view, const UInt<F>& material, const Vec2<F>& uv,
                        const Footprint<F>& footprint, const MakePoint& make_point,
                        const Mask<F>& active) {
-  using R = MaterialRecord;
   const detail::InputReader<F> inputs(view, material, uv, footprint, active);
-  F opacity = detail::saturate(inputs.value(Input::kOpacity, inputs.record[&R::opacity]));
-  const UInt<F> graph = inputs.record[&R::opacity_graph];
-  const Mask<F> driven = active & Mask<F>(graph != UInt<F>(kNoGraph));
-  if (any(driven))
-    opacity =
-        graph_value<F>(view, graph, kOpacityOutput, make_point(driven), driven, Vec3<F>(opacity)).x;
-  const F threshold = inputs.record[&R::opacity_threshold];
+  const F opacity = material_opacity<F>(view, material, uv, footprint, make_point, active);
+  const F threshold = inputs.record[&MaterialRecord::opacity_threshold];
   const F cut = select(opacity < threshold, F(0.f), F(1.f));
   const F present = select(threshold > 0.f, cut, opacity);
   return select(detail::opacity_is_presence(inputs, threshold), present, F(1.f));

@@ -2,21 +2,18 @@
 /// Program "principled": UsdPreviewSurface.
 #pragma once
 
-#include <memory>
-#include <type_traits>
-
 #include "wavecomb/material/bsdf.h"
-#include "wavecomb/material/lobes/coat.h"
 #include "wavecomb/material/lobes/lambert.h"
 #include "wavecomb/material/lobes/microfacet_reflection.h"
-#include "wavecomb/material/lobes/multiple_scattering.h"
-#include "wavecomb/material/lobes/rough_interface.h"
+#include "wavecomb/material/lobes/principled_layers.h"
 #include "wavecomb/material/program_list.h"
 
 namespace wavecomb {
 
 /// Two-sided BSDF of UsdPreviewSurface ("UsdPreviewSurface Specification", OpenUSD): clearcoat over
-/// specular reflection over diffuse reflection and straight transmission. The specular lobe is GGX
+/// specular reflection over diffuse reflection and straight transmission. Ray traversal handles
+/// straight transmission (lobes/straight_transmission.h), except for the part by which its colours
+/// differ, which is a delta lobe of the BSDF. The specular lobe is GGX
 /// with multiple scattering, which is sampled with the diffuse lobe. F90 is 1, and F0 is lerp(((1 -
 /// ior) / (1 + ior))^2, base_color, metallic), or specular_color in the specular workflow. The
 /// diffuse colour is base_color (1 - metallic) opacity, and straight transmission is 1 - opacity;
@@ -29,73 +26,27 @@ namespace wavecomb {
 /// A program variant (material/description/variants.h) supports only some features. For materials
 /// without other features, its results are bitwise equal to those of the complete program.
 template <typename F, uint32_t kParts>
-class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
+class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F>,
+                       private PrincipledLayers<F, kParts> {
   using Viewed = ViewedBsdf<PrincipledBsdf<F, kParts>, F>;
-  static constexpr bool kMetal = (kParts & kMetalPart) != 0, kCoat = (kParts & kCoatPart) != 0,
-                        kStraight = (kParts & kTransmissionPart) != 0;
-  /// Type of the specular reflectance: a colour, or a scalar in variants without metal, whose
-  /// reflections are not coloured.
-  using Tint = std::conditional_t<kMetal, Color<F>, F>;
+  using Layers = PrincipledLayers<F, kParts>;
+  using Layers::kCoat;
+  using Layers::kMetal;
+  using typename Layers::Tint;
+  /// Whether the BSDF may transmit light, because layers pass colours differently.
+  static constexpr bool kTinted = Layers::kStraight && kMetal;
 
  public:
   static constexpr ProgramId kProgram = ProgramId::kPrincipled;
   static constexpr bool kReadsIor = true;
   static constexpr bool kEmits = (kParts & kEmissionPart) != 0;
   static constexpr bool kTextured = (kParts & kTexturePart) != 0;
+  static constexpr bool kTransmitsStraight = Layers::kStraight;
   /// Inputs that may read textures. The mask has either all inputs or none, because even one
   /// textured input aligns the tangent frame with the texture.
-  static constexpr uint32_t kInputs =
-      !kTextured ? 0u
-                 : input_bit(Input::kBaseColor) | input_bit(Input::kSpecularColor) |
-                       input_bit(Input::kRoughness) | input_bit(Input::kMetallic) |
-                       input_bit(Input::kClearcoat) | input_bit(Input::kClearcoatRoughness) |
-                       input_bit(Input::kOpacity) | input_bit(Input::kNormal);
+  static constexpr uint32_t kInputs = !kTextured ? 0u : kPrincipledInputs;
 
-  PrincipledBsdf(const ShadingParams<F>& params, bool schlick) : roughness_(params.roughness) {
-    const F ior = coat_ior(params.ior);
-    f0_ = Tint(f0_from_ior(ior));
-    diffuse_ = params.base_color;
-    F exact(schlick ? 0.f : 1.f);
-    F metallic(0.f);
-    if constexpr (kMetal) {
-      const Mask<F> specular_workflow =
-          Mask<F>((params.flags & UInt<F>(uint32_t{kSpecularWorkflow})) != UInt<F>(0u));
-      metallic = select(specular_workflow, F(0.f), params.metallic);
-      f0_ = lerp(f0_, params.base_color, metallic);
-      f0_ = select<F>(specular_workflow, params.specular_color, f0_);
-      // Metals and the specular workflow use Schlick's formula, dielectrics the exact Fresnel
-      // formula.
-      if (!schlick) exact = select(specular_workflow, F(0.f), F(1.f - metallic));
-    }
-    if constexpr (kMetal || kStraight)
-      diffuse_ = diffuse_ * F(F(1.f - metallic) * (kStraight ? params.opacity : F(1.f)));
-    if constexpr (kStraight) transparency_ = F(1.f - params.opacity);
-    interface_ = CoatFresnel<F>(ior, exact);
-    const F alpha = alpha_from_roughness(roughness_);
-    smooth_ = alpha < kDeltaAlpha;
-    ggx_.alpha = max(alpha, F(kDeltaAlpha));
-    lost_ = LostEnergy<F>(ggx_.alpha);
-    multiple_ = lost_.tint(interface_.average(f0_));
-    if constexpr (kMetal)
-      multiple_ = select<F>(smooth_, Color<F>(F(0.f)), multiple_);
-    else
-      multiple_ = select(smooth_, F(0.f), multiple_);
-    // RoughInterface is large, so it is constructed in place.
-    std::construct_at(&rough_, interface_, roughness_, ggx_.alpha, lost_, smooth_);
-    average_ = rough_.average(f0_, multiple_);
-    if constexpr (!kCoat) return;
-    clearcoat_ = params.clearcoat;
-    coat_roughness_ = params.clearcoat_roughness;
-    coat_ = CoatFresnel<F>(ior, F(schlick ? 0.f : 1.f));
-    const F coat_alpha = alpha_from_roughness(coat_roughness_);
-    coat_smooth_ = coat_alpha < kDeltaAlpha;
-    coat_ggx_.alpha = max(coat_alpha, F(kDeltaAlpha));
-    if (has_coat()) {
-      coat_lost_ = LostEnergy<F>(coat_ggx_.alpha);
-      rough_coat_ =
-          RoughInterface<F>(coat_, coat_roughness_, coat_ggx_.alpha, coat_lost_, coat_smooth_);
-    }
-  }
+  PrincipledBsdf(const ShadingParams<F>& params, bool schlick) : Layers(params, schlick) {}
 
   Color<F> albedo() const { return min(Color<F>(diffuse_ + Color<F>(f0_)), Color<F>(F(1.f))); }
   Mask<F> has_non_delta() const {
@@ -115,9 +66,9 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
     F lost_share;
     Tint specular;     ///< directional albedo
     Color<F> diffuse;  ///< diffuse colour times transmission towards the viewer
-    Color<F> straight;
+    Color<F> tinted;   ///< transmission of the BSDF
     MaskedView<F> masked;
-    F p_diffuse, p_specular, p_coat, p_straight;
+    F p_diffuse, p_specular, p_coat, p_tinted;
   };
 
   View view(const Vec3<F>& wo) const {
@@ -134,8 +85,9 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
     v.masked = MaskedView<F>(ggx_, v.o);
     const F below = 1.f - v.coat;
     const Color<F> passed = Color<F>(F(1.f)) - Color<F>(v.specular);
-    v.straight = Color<F>(F(0.f));
-    if constexpr (kStraight) v.straight = passed * F(below * transparency_);
+    v.tinted = Color<F>(F(0.f));
+    if constexpr (kTinted)
+      v.tinted = tinted_transmission(Color<F>(passed * F(below * transparency_)));
     // Probabilities are estimated contributions; a lobe that can contribute gets at least 0.02
     // before normalisation.
     const F floor(0.02f);
@@ -143,15 +95,15 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
     const F diffuse = select(is_black(diffuse_), multiple,
                              max(fma(below, luminance(diffuse_ * passed), multiple), floor));
     const F specular = max(F(below * luminance(Color<F>(v.specular))), floor);
-    F coat(0.f), straight(0.f);
+    F coat(0.f), tinted(0.f);
     if constexpr (kCoat) coat = select(clearcoat_ > 0.f, max(v.coat, floor), F(0.f));
-    if constexpr (kStraight)
-      straight = select(transparency_ > 0.f, max(luminance(v.straight), floor), F(0.f));
-    const F inv = 1.f / F(F(diffuse + specular) + F(coat + straight));
+    if constexpr (kTinted)
+      tinted = select(is_black(v.tinted), F(0.f), max(luminance(v.tinted), floor));
+    const F inv = 1.f / F(F(diffuse + specular) + F(coat + tinted));
     v.p_diffuse = diffuse * inv;
     v.p_specular = specular * inv;
     v.p_coat = coat * inv;
-    v.p_straight = straight * inv;
+    v.p_tinted = tinted * inv;
     return v;
   }
 
@@ -160,7 +112,7 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
   F delta_probability(const View& v) const {
     F mirrors = select(smooth_, v.p_specular, F(0.f));
     if constexpr (kCoat) mirrors = mirrors + select(coat_smooth_, v.p_coat, F(0.f));
-    return select(v.o.z != 0.f, F(mirrors + v.p_straight), F(0.f));
+    return select(v.o.z != 0.f, F(mirrors + v.p_tinted), F(0.f));
   }
 
   BsdfEval<F> eval(const View& v, const Vec3<F>& wi) const {
@@ -181,18 +133,18 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
     const Vec3<F>& wo = view.o;
     const F before_specular = view.p_diffuse;
     const F before_coat = before_specular + view.p_specular;
-    const F before_straight = before_coat + view.p_coat;
+    const F before_tinted = before_coat + view.p_coat;
     const Mask<F> specular = (u_lobe >= before_specular) & (u_lobe < before_coat);
-    Mask<F> coat(false), straight(false), rough_coat(false), smooth_coat(false);
+    Mask<F> coat(false), tinted(false), rough_coat(false), smooth_coat(false);
     if constexpr (kCoat) {
-      coat = (u_lobe >= before_coat) & (u_lobe < before_straight);
+      coat = (u_lobe >= before_coat) & (u_lobe < before_tinted);
       smooth_coat = coat & coat_smooth_;
       rough_coat = coat & not_(coat_smooth_);
     }
-    if constexpr (kStraight) straight = (u_lobe >= before_straight) & (view.p_straight > 0.f);
+    if constexpr (kTinted) tinted = (u_lobe >= before_tinted) & (view.p_tinted > 0.f);
     const Mask<F> above = wo.z > 0.f;
     const Mask<F> mirrors = ((specular & smooth_) | smooth_coat) & above;
-    const Mask<F> passes = straight & above;
+    const Mask<F> passes = tinted & above;
 
     Vec3<F> wi = square_to_cosine_hemisphere(u, v);
     const Mask<F> glossy = (specular & not_(smooth_)) | rough_coat;
@@ -202,7 +154,7 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
       wi = select<F>(glossy, sample_microfacet(ggx, wo, u, v), wi);
     }
     wi = select<F>(mirrors, Vec3<F>(-wo.x, -wo.y, wo.z), wi);
-    if constexpr (kStraight) wi = select<F>(passes, -wo, wi);
+    if constexpr (kTinted) wi = select<F>(passes, -wo, wi);
 
     const BsdfEval<F> e = eval_above(wo, wi, view);
     const Mask<F> delta = mirrors | passes;
@@ -218,9 +170,9 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
       p_delta = select(coat, view.p_coat, p_delta);
       f_delta = select<F>(coat, Color<F>(view.coat), f_delta * F(1.f - view.coat));
     }
-    if constexpr (kStraight) {
-      p_delta = select(passes, view.p_straight, p_delta);
-      f_delta = select<F>(passes, view.straight, f_delta);
+    if constexpr (kTinted) {
+      p_delta = select(passes, view.p_tinted, p_delta);
+      f_delta = select<F>(passes, view.tinted, f_delta);
     }
     s.weight = select<F>(delta, f_delta * F(1.f / max(p_delta, F(1e-20f))), s.weight);
     s.pdf = select(delta, p_delta, s.pdf);
@@ -237,20 +189,7 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
     return F(1.f - coat_albedo(max(min(wo.z, abs(wi.z)), F(0.f))));
   }
 
-  /// Whether any lane has a clearcoat.
-  bool has_coat() const {
-    if constexpr (kCoat) return any(Mask<F>(clearcoat_ > 0.f));
-    return false;
-  }
-
   F coat_reflectance(const F& cos_i) const { return clearcoat_ * coat_(coat_.f0_exact, cos_i); }
-  F coat_albedo(const F& z) const {
-    const F lost = select(coat_smooth_, F(0.f), coat_lost_(z));
-    return clearcoat_ * rough_coat_.albedo(coat_.f0_exact, F(0.f), z, lost);
-  }
-  Tint specular_albedo(const F& z) const {
-    return rough_.albedo(f0_, multiple_, z, select(smooth_, F(0.f), lost_(z)));
-  }
   /// Transmission of the specular interface for cosine z.
   Tint passing(const F& z) const { return Tint(F(1.f)) - specular_albedo(z); }
 
@@ -279,14 +218,32 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F> {
     return {f, pdf};
   }
 
-  F roughness_, coat_roughness_, clearcoat_, transparency_;
-  CoatFresnel<F> coat_, interface_;
-  Tint f0_, average_, multiple_;
-  Color<F> diffuse_;
-  LostEnergy<F> lost_, coat_lost_;
-  RoughInterface<F> rough_, rough_coat_;
-  Ggx<F> ggx_, coat_ggx_;
-  Mask<F> smooth_, coat_smooth_;
+  /// Returns the part of straight transmission that ray traversal leaves to the BSDF. A remainder
+  /// of rounding errors is ignored.
+  static Color<F> tinted_transmission(const Color<F>& straight) {
+    const Color<F> rest = straight - Color<F>(passing_probability<F>(straight));
+    const Mask<F> real = max_component(rest) > F(1e-5f * max_component(straight));
+    return select<F>(real, rest, Color<F>(F(0.f)));
+  }
+
+  using Layers::average_;
+  using Layers::clearcoat_;
+  using Layers::coat_;
+  using Layers::coat_albedo;
+  using Layers::coat_ggx_;
+  using Layers::coat_roughness_;
+  using Layers::coat_smooth_;
+  using Layers::diffuse_;
+  using Layers::f0_;
+  using Layers::ggx_;
+  using Layers::has_coat;
+  using Layers::interface_;
+  using Layers::lost_;
+  using Layers::multiple_;
+  using Layers::roughness_;
+  using Layers::smooth_;
+  using Layers::specular_albedo;
+  using Layers::transparency_;
 };
 
 }  // namespace wavecomb

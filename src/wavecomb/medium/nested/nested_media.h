@@ -281,6 +281,7 @@ inline void NestedMedia::attenuate(const NestedRays& rays, const float* most,
   keys.ray_kind = kVisibleToAll;
   keys.bounce_pdf = nullptr;
   keys.shadow_set = nullptr;
+  keys.optical_depth = nullptr;
   size_t left = 0;
   for (size_t i = 0; i < rays.size; i += kWidth<F>) {
     const F length = load<F>(most + i);

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 /// The step `interact`: turns a hit into a shading point with a BSDF and a shading frame.
 ///
+/// If the surface transmits straight with the probability T, then T_k <- T_k / (1 - T)
+/// (material/lobes/straight_transmission.h).
+///
 /// If the ray to x_k, of length t, passes through an absorbing material with extinction sigma, then
 /// T_k <- T_k exp(-sigma t) (Beer and Lambert). With nested dielectrics
 /// (medium/nested/nested_media.h), absorption was applied earlier, and the surface refracts by the
@@ -13,6 +16,7 @@
 #include "wavecomb/geometry/hit/shading_normal.h"
 #include "wavecomb/geometry/hit/surface.h"
 #include "wavecomb/material/inputs/graph_inputs.h"
+#include "wavecomb/material/lobes/straight_transmission.h"
 #include "wavecomb/material/params.h"
 #include "wavecomb/path/path_state.h"
 
@@ -143,6 +147,16 @@ WAVECOMB_INLINE MaterialLookup<Bsdf, F> look_up_material(const Vertex<F, kFeatur
                          F(1.f / kMaxIor), F(kMaxIor));
   } else if constexpr (Bsdf::kAbsorbs) {
     throughput *= params.transmittance(v.t, F(-dot(path.dir, s.ng)));
+  }
+  if constexpr (Bsdf::kTransmitsStraight) {
+    const Mask<F> clear = v.active & transmits_straight<F>(params.flags);
+    if (any(clear)) {
+      const StraightTransmission<F> straight =
+          straight_transmission<F>(v.scene, v.hit, v.material, path.dir, clear);
+      params.opacity = select(clear, straight.opacity, params.opacity);
+      const F stopped = max(F(1.f - straight.probability), F(1e-6f));
+      throughput = select<F>(clear, throughput * F(1.f / stopped), throughput);
+    }
   }
   const Vec3<F> none(F(0.f));
   return {Bsdf(params, v.has(kExperiments) && v.settings.schlick_fresnel), throughput,

@@ -57,6 +57,8 @@ inline PresenceKeys presence_keys(const PathPool& pool, uint32_t depth, bool sha
   PresenceKeys keys{&path->key.pixel_hash, &path->key.sample, kRowWords<PathRow>,
                     2 * depth + (shadow ? 1u : 0u)};
   keys.ray_kind = ray_kind(depth, shadow);
+  keys.passes_straight = true;
+  if (shadow) keys.optical_depth = pool.optical_depths;
   if (!shadow && depth > 0) keys.bounce_pdf = &path->pdf;
   if (uses_linking) {
     keys.shadow_set = &reinterpret_cast<const ShadowRow<float>*>(pool.shadows)->set;
@@ -82,7 +84,24 @@ inline void trace(Wave& wave, const WaveContext& context, uint32_t depth, const 
   wave.counts.add_rays(depth, q.size);
 }
 
-/// Tests the shadow rays for occlusion. `uses_linking` is passed to presence_keys().
+/// Multiplies the contributions of unblocked shadow rays by the transmittance of the partly
+/// transparent surfaces that the rays pass. Does not change the contributions of blocked rays.
+template <typename F>
+[[gnu::noinline, gnu::cold]] void attenuate_by_surfaces(Wave& wave) {
+  using U = UInt<F>;
+  const ShadowQueue& q = wave.shadows;
+  for (size_t i = 0; i < q.size; i += kWidth<F>) {
+    const Mask<F> free = first_lanes<F>(q.size - i) & Mask<F>(load<U>(q.occluded + i) == U(0u));
+    const U depth =
+        select(Mask<U>(free),
+               gather<U>(wave.pool.optical_depths, load<U>(q.slot + i), Mask<U>(free)), U(0u));
+    const F passed = surface_transmittance<F>(depth);
+    for (float* c : {q.r, q.g, q.b}) store(c + i, F(load<F>(c + i) * passed));
+  }
+}
+
+/// Tests the shadow rays for occlusion, and attenuates the contributions of rays that pass partly
+/// transparent surfaces. `uses_linking` is passed to presence_keys().
 template <typename F>
 void occlude(Wave& wave, const WaveContext& context, uint32_t depth, bool uses_linking) {
   const ShadowQueue& q = wave.shadows;
@@ -90,12 +109,16 @@ void occlude(Wave& wave, const WaveContext& context, uint32_t depth, bool uses_l
                      q.dz, q.tfar, q.slot, q.size, fetch_times<F>(wave, q)};
   if (context.recorder) context.recorder->occluded(&wave, rays, depth, false);
   const auto start = wave.aovs.start_time();
+  if (uint32_t* depths = wave.pool.optical_depths)
+    for (size_t i = 0; i < q.size; ++i) depths[q.slot[i]] = 0;
   context.accel->occluded(rays, q.occluded, context.traversal_width, false,
                           presence_keys(wave.pool, depth, true, uses_linking));
   const auto slot_of = [&](size_t i) { return q.slot[i]; };
   wave.aovs.charge_rays(q.size, slot_of);
   wave.aovs.spread_time(q.size, start, slot_of);
   wave.counts.add_shadow_rays(depth, q.size);
+  if (wave.pool.optical_depths) [[unlikely]]
+    attenuate_by_surfaces<F>(wave);
 }
 
 /// Adds the contributions of unblocked shadow rays to the radiance of their paths, multiplied by
