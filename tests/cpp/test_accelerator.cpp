@@ -876,6 +876,124 @@ TEST_P(SmallScene, PresenceByTextureAndThreshold) {
   }
 }
 
+/// A stack of three clear squares, turned by `degrees` about y and 1 apart along z, with an opaque
+/// square behind. Their material has opacity `opacity`, index 1.5 and no roughness.
+std::shared_ptr<const Scene> panes(float opacity, double degrees, bool instanced) {
+  SceneBuilder b;
+  Material m = make_material(ProgramId::kPrincipled);
+  m.opacity = opacity;
+  m.roughness = 0;
+  m.ior = 1.5f;
+  const uint32_t glass = b.add_material(m);
+  const uint32_t group = b.add_group("pane");
+  b.add_to_group(group, b.add_mesh(make_mesh(quad({-4, -4, 0}, {8, 0, 0}, {0, 8, 0}))));
+  for (int i = 0; i < 3; ++i) {
+    const Affine place = translate(0, 0, static_cast<float>(-i)) * rotate(1, degrees);
+    if (instanced)
+      b.add_instance(0, group, place * scale(1, 0.5f, 3), glass);
+    else
+      b.add_to_group(0, b.add_mesh(make_mesh(
+                            quad({-4, -4, 0}, {8, 0, 0}, {0, 8, 0}).transform(place), glass)));
+  }
+  b.add_to_group(0, b.add_mesh(make_mesh(quad({-9, -9, -20}, {18, 0, 0}, {0, 18, 0}))));
+  return b.build();
+}
+
+/// Fraction of light that a pane lets pass, by Fresnel's formulas for index 1.5.
+double pane_transmission(double opacity, double degrees) {
+  const double c = std::cos(degrees * kPiD / 180), t = std::sqrt(1 - (1 - c * c) / 2.25);
+  const double p = (1.5 * c - t) / (1.5 * c + t), s = (c - 1.5 * t) / (c + 1.5 * t);
+  return (1 - opacity) * (1 - 0.5 * (p * p + s * s));
+}
+
+TEST_P(SmallScene, StraightTransmissionIsAProbability) {
+  const size_t n = size_for_build(20000, 4);
+  Rays rays(n);
+  std::mt19937 rng(2);
+  std::uniform_real_distribution<double> uniform(-0.2, 0.2);
+  for (size_t i = 0; i < n; ++i) {
+    const double x = uniform(rng), y = uniform(rng);
+    rays.aim(i, {x, y, 5}, {x, y, 0});
+    rays.tfar[i] = i % 2 == 0 ? 15.f : 30.f;  // before and behind the opaque square
+  }
+  const Keys words(n);
+  PresenceKeys keys = words.keys(4);
+  for (const bool instanced : {false, true})
+    for (const auto& [opacity, degrees] : {std::pair(0.1, 0.0), {0.4, 50.0}, {0.0, 75.0}}) {
+      const auto scene = panes(static_cast<float>(opacity), degrees, instanced);
+      const EmbreeAccelerator accel(scene, 1, GetParam());
+      SCOPED_TRACE(testing::Message() << opacity << " " << degrees << " " << instanced);
+      const double passes = pane_transmission(opacity, degrees);
+      keys.passes_straight = false;
+      const Hits opaque = trace(accel, rays, 16, false, keys);
+      keys.passes_straight = true;
+      const Hits hits = trace(accel, rays, 16, false, keys);
+      expect_same_hits(hits, trace(accel, rays, 1, false, keys), n, "panes");
+      double count[4] = {0, 0, 0, 0};
+      for (size_t i = 0; i < n; ++i) {
+        ASSERT_LT(opaque.t[i], 6.f);
+        const int layer = static_cast<int>(std::lround(hits.t[i] - opaque.t[i]));
+        ++count[std::min(layer, 3)];
+      }
+      double left = 1;
+      for (int layer = 0; layer < 4; ++layer) {
+        const double p = layer < 3 ? left * (1 - passes) : left, expected = p * n;
+        left -= p;
+        // With 24 comparisons, 4.7 sigma gives a false alarm rate of 1e-4 in total.
+        EXPECT_NEAR(count[layer], expected, 4.7 * std::sqrt(expected * (1 - p))) << layer;
+      }
+      // Shadow rays pass all panes and are attenuated, equally for all packet widths.
+      std::vector<uint32_t> first;
+      for (const uint32_t width : {1u, 4u, 8u, 16u}) {
+        std::vector<uint32_t> depths(n, 0);
+        keys.optical_depth = depths.data();
+        const std::vector<uint32_t> stopped = blocked(accel, rays, width, false, keys);
+        keys.optical_depth = nullptr;
+        for (size_t i = 0; i < n; ++i) {
+          ASSERT_EQ(stopped[i] != 0, i % 2 == 1) << i;
+          if (stopped[i] != 0) {
+            depths[i] = 0;
+          } else {
+            ASSERT_NEAR(surface_transmittance<float>(depths[i]), std::pow(passes, 3), 1e-4) << i;
+          }
+        }
+        if (first.empty()) first = depths;
+        EXPECT_EQ(first, depths) << width;
+      }
+    }
+}
+
+TEST(Accelerator, PresenceIsStratifiedOverThePixel) {
+  const EmbreeAccelerator accel(panes(0.4f, 0, false), 1);
+  const double passes = pane_transmission(0.4, 0);
+  constexpr size_t kSamples = 256, kPixels = 64;
+  const size_t n = kSamples * kPixels;
+  Rays rays(n);
+  Keys words(n);
+  std::mt19937 rng(3);
+  for (size_t i = 0; i < n; ++i) {
+    rays.aim(i, {0.1, 0.05, 5}, {0.1, 0.05, 0});
+    words.sample[i] = static_cast<uint32_t>(i % kSamples);
+    words.pixel_hash[i] =
+        i % kSamples == 0 ? static_cast<uint32_t>(rng()) : words.pixel_hash[i - 1];
+  }
+  PresenceKeys keys = words.keys(6);
+  keys.passes_straight = true;
+  const Hits hits = trace(accel, rays, 16, false, keys);
+  double pairs = 0;
+  for (size_t pixel = 0; pixel < kPixels; ++pixel) {
+    int first = 0;
+    for (size_t i = pixel * kSamples; i < (pixel + 1) * kSamples; ++i) {
+      first += hits.t[i] > 5.5f;
+      pairs += hits.t[i] > 6.5f;
+    }
+    EXPECT_NEAR(first, passes * kSamples, 1.01) << pixel;
+  }
+  // The decisions of two panes are independent: 4 sigma of a binomial distribution.
+  const double expected = passes * passes * static_cast<double>(n);
+  EXPECT_NEAR(pairs, expected, 4 * std::sqrt(expected * (1 - passes * passes)));
+}
+
 TEST(Accelerator, PresenceByItself) {
   const auto scene = leaves(1, 1, 0.5f, true, false);
   const uint32_t mesh = scene->groups()[0].meshes[0];

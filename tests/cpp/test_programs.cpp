@@ -111,6 +111,58 @@ TEST(Programs, DiffusePartIsOfTheWhole) {
     });
 }
 
+TEST(Programs, WhatIsNotReflectedPassesStraight) {
+  // A white surface neither absorbs nor adds light, whatever its opacity, roughness and coat. The
+  // fits of albedos (lobes/rough_interface.h, lobes/multiple_scattering.h) lose up to 3 %.
+  using Bsdf = PrincipledBsdf<float, kAllParts>;
+  for (const float opacity : {0.f, 0.3f, 0.8f})
+    for (const float roughness : {0.f, 0.3f, 0.7f})
+      for (const float coat : {0.f, 1.f})
+        for (const float metallic : {0.f, 0.5f}) {
+          auto p = plain_params();
+          p.base_color = {1, 1, 1};
+          p.opacity = opacity;
+          p.roughness = roughness;
+          p.clearcoat = coat;
+          p.clearcoat_roughness = 0.2f;
+          p.metallic = metallic;
+          const auto params = params_for<Bsdf, float>(p);
+          const Bsdf bsdf(params, false);
+          const PrincipledLayers<float, kAllParts> layers(params, false);
+          for (const float z : {0.2f, 0.6f, 1.f}) {
+            const Vec straight = layers.straight(z);
+            EXPECT_NEAR(passing_probability<float>(straight), straight.x, 1e-5f);
+            const double whole = furnace(bsdf, direction(z, 1), 4000) + double{straight.x};
+            EXPECT_LT(whole, 1.015) << opacity << " " << roughness << " " << coat << " " << z;
+            // Where a surface is partly metallic, its base absorbs light.
+            if (metallic > 0) continue;
+            EXPECT_GT(whole, 0.96) << opacity << " " << roughness << " " << coat << " " << z;
+          }
+        }
+}
+
+TEST(Programs, TintedTransmissionIsSharedWithTraversal) {
+  // Traversal transmits the smallest component, and the BSDF a delta lobe with the rest.
+  using Bsdf = PrincipledBsdf<float, kAllParts>;
+  auto p = plain_params();
+  p.base_color = {0.9f, 0.6f, 0.2f};
+  p.metallic = 0.8f;
+  p.opacity = 0.25f;
+  p.roughness = 0.3f;
+  const auto params = params_for<Bsdf, float>(p);
+  const Bsdf bsdf(params, false);
+  const Vec wo = direction(0.7, 2),
+            straight = PrincipledLayers<float, kAllParts>(params, false).straight(wo.z);
+  EXPECT_LT(straight.x, straight.z);
+  Vec passed(0.f);
+  for (uint32_t i = 0; i < 1000; ++i) {
+    const auto s = bsdf.sample(wo, (static_cast<float>(i) + 0.5f) / 1000, 0.4f, 0.3f);
+    if (s.is_delta && s.wi.z < 0) passed = s.weight * s.pdf;
+  }
+  EXPECT_NEAR(passed.x, 0, 1e-6f);
+  EXPECT_NEAR(passed.z, straight.z - straight.x, 1e-5f);
+}
+
 TEST(Programs, ReciprocityHolds) {
   // f(o, i) / n_o^2 = f(i, o) / n_i^2 (Veach 1997, eq. 5.14).
   std::mt19937 rng(11);

@@ -97,17 +97,19 @@ class Integrator {
                      keys);
     return h;
   }
-  /// Returns whether nothing blocks light `light` at distance t from `o` along d.
-  bool is_free(const Vec3<F>& o, const Vec3<F>& d, F t, uint32_t light) {
+  /// Returns the fraction of light that reaches `o` from light `light` at distance t along d.
+  F visibility(const Vec3<F>& o, const Vec3<F>& d, F t, uint32_t light) {
     const F tfar = t * 0.9999f;
-    uint32_t words[2], blocked = 0, set = 0;
+    uint32_t words[2], blocked = 0, set = 0, optical_depth = 0;
     PresenceKeys keys = fresh_keys(words);
+    keys.passes_straight = true;
+    keys.optical_depth = &optical_depth;
     if (scene_.lights.links.members) {
       set = scene_.lights.lights[light].shadow_link + 1;
       keys.shadow_set = &set;
     }
     accel_.occluded(span(o, d, tfar), &blocked, 1, false, keys);
-    return blocked == 0;
+    return blocked != 0 ? 0.f : surface_transmittance<F>(optical_depth);
   }
 
   bool lights_class(uint32_t record, uint32_t link) const {
@@ -170,7 +172,7 @@ class Integrator {
       return finite(hit.geom, ray.o, ray.d, hit.t) * share_met(hit.geom, ray, depth == 0);
     Rgb out;
     visit_program<F>(static_cast<ProgramId>(scene_.material_program[material_of(hit)]),
-                     [&]<typename Bsdf>() { out = vertex<Bsdf>(hit, ray, depth); });
+                     [&]<typename Bsdf>() { out = vertex<Bsdf>(hit, ray, depth, tfar); });
     return out;
   }
 
@@ -219,9 +221,25 @@ class Integrator {
     }
   };
 
+  /// Returns the radiance that passes straight through the surface of a hit, and sets the opacity
+  /// of `at`. The same ray continues behind the surface.
   template <typename Bsdf>
-  Rgb vertex(const Hit& hit, const Ray& ray, uint32_t depth) {
-    const Point<Bsdf> at(scene_, hit, mesh_of(hit), material_of(hit), ray, time_);
+  Rgb straight(const Hit& hit, const Ray& ray, uint32_t depth, F tfar, Point<Bsdf>& at) {
+    const uint32_t material = material_of(hit);
+    if ((scene_.materials.materials[material].flags & kTransmitsStraight) == 0) return Rgb(0.f);
+    const MeshHit<F> on_mesh{hit.inst, mesh_of(hit), hit.prim, hit.u, hit.v, time_};
+    const StraightTransmission<F> t =
+        straight_transmission<F>(scene_, on_mesh, material, ray.d, true);
+    at.params.opacity = t.opacity;
+    if (t.probability == 0.f) return Rgb(0.f);
+    Ray behind = ray;
+    behind.o = spawn_origin<F>(at.s, ray.d);
+    return radiance(behind, depth, tfar - hit.t) * t.probability;
+  }
+
+  template <typename Bsdf>
+  Rgb vertex(const Hit& hit, const Ray& ray, uint32_t depth, F tfar) {
+    Point<Bsdf> at(scene_, hit, mesh_of(hit), material_of(hit), ray, time_);
     const Surface<F>& s = at.s;
     Rgb passed(1.f);
     if constexpr (Bsdf::kAbsorbs) passed = at.params.transmittance(hit.t, -dot(ray.d, s.ng));
@@ -232,6 +250,7 @@ class Integrator {
         out =
             mesh_light_emission<F>(scene_, hit.inst, hit.geom, out, ray.state(), depth == 0, true);
     }
+    if constexpr (Bsdf::kTransmitsStraight) out += straight(hit, ray, depth, tfar, at);
     if (depth >= settings_.max_depth) return passed * out;
 
     const Bsdf bsdf(at.params, settings_.schlick_fresnel);
@@ -323,7 +342,7 @@ class Integrator {
       Rgb c = triple(light.radiance) * (is_sun ? 1.f : 1.f / (t * t));
       if (light.shaping != kNoShaping) c = detail::shaped<F>(view, light.shaping, -d, c, true);
       c = c * lit(light, bsdf.eval(wo, wi).f_cos, bsdf.diffuse_f_cos(wo, wi));
-      if (is_positive(c) && is_free(spawn_origin<F>(s, d), d, t, i)) sum += c;
+      if (is_positive(c)) sum += c * visibility(spawn_origin<F>(s, d), d, t, i);
     }
     return sum;
   }
@@ -341,7 +360,7 @@ class Integrator {
       if (!(t > 0)) continue;
       const Rgb c = (is_far ? infinite(i, ray.o, ray.d) : finite(i, ray.o, ray.d, t)) *
                     lit(light, f_cos, diffuse);
-      if (is_positive(c) && is_free(ray.o, ray.d, t, i)) sum += c;
+      if (is_positive(c)) sum += c * visibility(ray.o, ray.d, t, i);
     }
     if (!view.mesh_lights) return sum;
     return sum + sampled_only_meshes(f_cos, diffuse, ray) + hidden_meshes(f_cos, diffuse, ray);
@@ -367,7 +386,7 @@ class Integrator {
       if (light.shaping != kNoShaping)
         c = detail::shaped<F>(scene_.lights, light.shaping, -ray.d, c, true);
       c = c * lit(light, f_cos, diffuse);
-      if (is_positive(c) && is_free(ray.o, ray.d, t, i)) sum += c;
+      if (is_positive(c)) sum += c * visibility(ray.o, ray.d, t, i);
     }
     return sum;
   }
@@ -387,7 +406,7 @@ class Integrator {
       Rgb c = triple(triangle.radiance);
       if (light.shaping != kNoShaping) c = detail::shaped<F>(view, light.shaping, -ray.d, c, true);
       c = c * lit(light, f_cos, diffuse);
-      if (is_positive(c) && is_free(ray.o, ray.d, t, record)) sum += c;
+      if (is_positive(c)) sum += c * visibility(ray.o, ray.d, t, record);
     }
     return sum;
   }

@@ -10,6 +10,7 @@
 ///   L(x, wo) = Le + sum over delta lobes c L(x', wi)                    (each followed)
 ///                 + (2 or 4) pi / n sum over n uniform wi f |cos| L(x', wi)
 ///                 + sum over delta lights f |cos| E V                   (they have no density)
+///                 + T L(x', -wo)               (straight transmission T, which is not a bounce)
 ///
 /// Lights with multipliers, and lights that production finds only by light samples
 /// (LightRecord::sampled_only: invisible shapes, shadow links), are evaluated along the same

@@ -198,13 +198,13 @@ def test_a_volume_has_thickness(tmp_path: Path) -> None:
         "index_to_object": np.diag([0.125, 0.125, 0.125, 1.0]),
     }])  # fmt: skip
     stage = write(tmp_path, CAMERA + LIT + CLOUD)
-    picture = _render(stage, spp=64)
+    picture = _render(stage, spp=64, deep_samples=64)
     _check(picture, tmp_path)
     assert picture.deep is not None
     thick = picture.deep.samples[:, 5] - picture.deep.samples[:, 4]
     assert (thick >= 0).all() and (thick > 0).any()
     assert (thick <= 0.0101 * picture.deep.samples[:, 5]).mean() > 0.9
-    other = _render(stage, spp=64, integrator="reference")
+    other = _render(stage, spp=64, deep_samples=64, integrator="reference")
     assert other.deep is not None
     assert other.deep.samples.tobytes() == picture.deep.samples.tobytes()
 

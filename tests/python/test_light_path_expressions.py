@@ -74,8 +74,10 @@ def Xform "World" {
 
 
 def _material(name: str, inputs: str) -> str:
+    program = 'custom string wavecomb:program = "dielectric"' if name == "Glass" else ""
     return f"""
     def Material "{name}" {{
+        {program}
         token outputs:surface.connect = </World/{name}/S.outputs:surface>
         def Shader "S" {{
             uniform token info:id = "UsdPreviewSurface"
@@ -91,7 +93,7 @@ _MATERIALS = {
     "Plastic": "color3f inputs:diffuseColor = (0.1, 0.5, 0.2)\nfloat inputs:roughness = 0.3",
     "Chrome": "color3f inputs:diffuseColor = (0.9, 0.9, 0.9)\nfloat inputs:roughness = 0\n"
     "float inputs:metallic = 1",
-    "Glass": "float inputs:opacity = 0.1\nfloat inputs:roughness = 0\nfloat inputs:ior = 1.5",
+    "Glass": "float inputs:roughness = 0\nfloat inputs:ior = 1.5",
     "Glow": "color3f inputs:emissiveColor = (3, 1, 0.5)",
 }
 PARTITIONS = {

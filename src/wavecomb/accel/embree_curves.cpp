@@ -47,9 +47,7 @@ void for_hits(const Arguments& args, RTCRayN* rays, CurveQuery query, const Want
                                                          .prim = sub_segment.prim,
                                                          .u = hit.u,
                                                          .v = hit.v,
-                                                         .slot = RTCRayN_id(rays, n, i),
-                                                         .dir = {},
-                                                         .time = 0.f},
+                                                         .slot = RTCRayN_id(rays, n, i)},
                                                         i))
           continue;
         found(i, sub_segment.prim, hit);

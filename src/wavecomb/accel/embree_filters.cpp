@@ -97,9 +97,7 @@ void presence_filter(const RTCFilterFunctionNArguments* args) {
                                                .prim = RTCHitN_primID(args->hit, n, i),
                                                .u = RTCHitN_u(args->hit, n, i),
                                                .v = RTCHitN_v(args->hit, n, i),
-                                               .slot = RTCRayN_id(args->ray, n, i),
-                                               .dir = {},
-                                               .time = 0.f},
+                                               .slot = RTCRayN_id(args->ray, n, i)},
                                               i);
     if (!present) args->valid[i] = 0;
   }

@@ -17,10 +17,10 @@ struct PresenceQuery {
   uint32_t instance;  ///< 0 for the world
   uint32_t geom;      ///< index of the geometry within the instance's group
   uint32_t mesh, prim;
-  float u, v;       ///< position on the primitive; for triangles, barycentric coordinates
-  uint32_t slot;    ///< slot of the path, an index into the arrays of `PresenceKeys`
-  Vec3<float> dir;  ///< direction of the ray
-  float time;       ///< shutter time of the ray
+  float u, v;         ///< position on the primitive; for triangles, barycentric coordinates
+  uint32_t slot;      ///< slot of the path, an index into the arrays of `PresenceKeys`
+  Vec3<float> dir{};  ///< direction of the ray
+  float time = 0;     ///< shutter time of the ray
 };
 
 /// Returns whether a surface stops a ray. The surface stops all rays if its presence is 1 and it
