@@ -118,19 +118,19 @@ class Materials:
         self, inputs: dict[str, str], nodes: dict[str, tuple[str, str]], *, may_transmit: bool
     ) -> None:
         """Choose a cut-out by presence or threshold, or transparency."""
-        ways = ["presence", "presence", "threshold", "transparent"]
-        way = str(self.random.choice(ways if may_transmit else ways[:3]))
+        ways = ["presence", "threshold", "transparent", "transparent"]
+        way = str(self.random.choice(ways if may_transmit else ways[:2]))
         self.features.append(way)
         inputs["float opacity"] = number(self.between(0.2, 0.8))
         if way == "transparent":
             self.delta = True
-            return
         if way == "presence":
             inputs["token opacityMode"] = '"presence"'
         if way == "threshold":
             inputs["float opacityThreshold"] = "0.5"
         if way == "threshold" or self.chance(0.4):
-            self.features.append("opacity texture")
+            what = "transparency texture" if way == "transparent" else "opacity texture"
+            self.features.append(what)
             nodes["float opacity"] = (self.image(8, 0.0, 1.0), "r")
 
     def glow(
