@@ -288,8 +288,8 @@ inline ScenePtr cornell() {
 }
 
 /// A scene with all six programs, textures, instances (also mirrored and stretched) and every kind
-/// of light.
-inline ScenePtr mixed() {
+/// of light. One material has the given opacity.
+inline ScenePtr mixed(float opacity = 0.4f) {
   SceneBuilder b;
   const uint32_t image = add_texture(b, 16, 8, 3, random_texels(16 * 8 * 3, 0.1f, 0.9f, 1));
   const uint32_t grey = add_texture(b, 8, 8, 1, random_texels(64, 0.05f, 0.8f, 2));
@@ -330,7 +330,7 @@ inline ScenePtr mixed() {
   at(m, Input::kMetallic) = use(grey, 0);
   add(m);
   m = make_material(ProgramId::kPrincipled, {0.2f, 0.6f, 0.3f}, 0.6f);
-  m.opacity = 0.4f;
+  m.opacity = opacity;
   add(m);
   m = make_material(ProgramId::kPrincipled, {0.1f, 0.1f, 0.1f}, 0.6f);
   at(m, Input::kEmission) = use(image);

@@ -21,7 +21,7 @@ Settings recorded_settings() {
 }
 
 TEST(RayRecording, KeepsEveryRayAndChangesNothing) {
-  const ScenePtr scene = mixed();
+  const ScenePtr scene = mixed(1.f);
   WavefrontRenderer renderer(scene, 2);
   const Settings settings = recorded_settings();
   const RenderedImage plain = renderer.render(settings);
@@ -39,7 +39,7 @@ TEST(RayRecording, KeepsEveryRayAndChangesNothing) {
 
 TEST(RayRecording, EmbreeAloneHitsWhatARenderHits) {
   // A scene with instances and every kind of light, including round ones.
-  const ScenePtr scene = mixed();
+  const ScenePtr scene = mixed(1.f);
   WavefrontRenderer renderer(scene, 2);
   RayRecording recording(scene, kPlenty);
   renderer.render(recorded_settings(), {.recorder = &recording});

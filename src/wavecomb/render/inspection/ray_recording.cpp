@@ -47,7 +47,8 @@ RayRecording::RayRecording(std::shared_ptr<const Scene> scene, uint64_t byte_lim
     : scene_(std::move(scene)), byte_limit_(byte_limit) {
   if (scene_->view().has_presence)
     throw Error(
-        "the scene has partly present surfaces, which Embree alone would take for opaque; record "
+        "the scene has surfaces of opacity below 1, which Embree alone would take for opaque; "
+        "record "
         "the rays of a stage without them");
 }
 
