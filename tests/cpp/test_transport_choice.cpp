@@ -56,7 +56,8 @@ TransportPilots trials_of(float left, float camera_noise, float light_noise, flo
 
 TransportGain gain_of(float left, float camera_noise, float light_noise, float light = 1,
                       double longer = 8) {
-  return transport_gain(trials_of(left, camera_noise, light_noise, light), longer);
+  const TransportPilots pilots = trials_of(left, camera_noise, light_noise, light);
+  return transport_gain(pilots, work_without(pilots), longer);
 }
 
 TEST(TransportGain, IsBelowOneWhereLightPathsBringNothing) {
@@ -76,9 +77,27 @@ TEST(TransportGain, IsTheRatioOfVariancesByCosts) {
 
 TEST(TransportGain, CountsWhatMergingCosts) {
   TransportPilots pilots = trials_of(0.1f, 0.1f, 0.1f, 1);
-  const double gain = transport_gain(pilots, 8).gain;
+  const double gain = transport_gain(pilots, work_without(pilots), 8).gain;
   pilots.merges = true;
-  EXPECT_LT(transport_gain(pilots, 8).gain, 0.97 * gain);
+  EXPECT_LT(transport_gain(pilots, work_without(pilots), 8).gain, 0.97 * gain);
+}
+
+TEST(TransportGain, MergesWhereOnlyMergingFindsLight) {
+  // Pilots with merging have one ratio only.
+  const TransportPilots unmerged = trials_of(0.1f, 0.1f, 0.1f, 1);
+  const PilotWork without = work_without(unmerged);
+  const TransportGain plain = transport_gain(unmerged, without, 8);
+  const auto gain_with = [&](float left) {
+    TransportPilots merged = trials_of(left, 0.1f, 0.1f, 1);
+    for (TransportPilot& t : merged.with[0]) t = {};
+    merged.merges = true;
+    const TransportGain gain = transport_gain(merged, without, 8);
+    EXPECT_EQ(gain.share.exponent, kCandidateShares.back().exponent);
+    return merging_gain(gain, plain);
+  };
+  EXPECT_LT(gain_with(0.1f), 1) << "nothing is hidden, and merging costs time";
+  EXPECT_GT(gain_with(0.5f), 5);
+  EXPECT_GT(gain_with(0.5f), gain_with(0.3f));
 }
 
 TEST(TransportGain, TakesManyLightPathsWhereTheyAreTheNoise) {
@@ -92,7 +111,7 @@ TEST(TransportGain, LooksPastTheNoisiestPixels) {
     for (auto& with : pilots.with)
       for (uint32_t seed = 0; seed < 2; ++seed)
         for (uint32_t i = 0; i < dots; ++i) with[seed].beauty[3 * (i * 97 + seed)] += 500;
-    return transport_gain(pilots, 8).gain;
+    return transport_gain(pilots, work_without(pilots), 8).gain;
   };
   EXPECT_GT(with_dots(0), 3);
   EXPECT_NEAR(with_dots(3), with_dots(0), 0.3 * with_dots(0)) << "six of 1,024 pixels";

@@ -223,11 +223,11 @@ std::vector<SettingInfo> work_settings() {
            {"filtered", "Adds light to all pixels nearby, weighted by the pixel filter."},
            {"pixel", "Adds light to one random pixel, since denoisers need independent noise."}},
           "How light paths add light to the pixels around a point that the camera sees."),
-      in_expectation(
-          number<&S::merge_radius>("merge_radius", "Merge radius", 0, 64,
-                                   "Radius in pixels of path merging, which finds caustics seen "
-                                   "in mirrors or through glass, but blurs them.",
-                                   "never")),
+      in_expectation(number_or_unset<&S::merge_radius>(
+          "merge_radius", "Merge radius", 0, 64,
+          "Radius in pixels of path merging, which finds caustics seen in mirrors or through "
+          "glass, but blurs them; by default, transport auto decides between 0 and 1.",
+          [](const S& s) -> SettingValue { return double{s.used_merge_radius()}; })),
       in_expectation(choice<&S::firefly>(
           "firefly", "Fireflies",
           {{"keep", "Very bright samples keep their weight, so the image has no bias."},

@@ -8,6 +8,7 @@
 
 #include "wavecomb/core/clock.h"
 #include "wavecomb/core/path_expressions/backward_automaton.h"
+#include "wavecomb/material/lobes/ggx.h"
 #include "wavecomb/wave/wave.h"
 
 namespace wavecomb {
@@ -38,6 +39,8 @@ constexpr double kNoisiest = 0.01;
 constexpr double kMaxLost = 8;
 /// Minimum predicted gain in efficiency for which light paths are used.
 constexpr double kMinLightPathGain = 1.3;
+/// Minimum predicted gain of merging over light paths without merging.
+constexpr double kMinMergingGain = 2;
 /// Roughness below which a lobe is sharp enough for visible caustics.
 constexpr float kSharpRoughness = 0.4f;
 
@@ -103,12 +106,6 @@ std::vector<double> inverse_squares(const std::vector<double>& mean, uint32_t wi
   return out;
 }
 
-/// Numbers of rays and shading records of a pilot render.
-struct PilotWork {
-  double rays = 0, records = 0;
-
-  double cost(double vertex) const { return rays + vertex * records; }
-};
 PilotWork work_of(const std::array<TransportPilot, 2>& pilots) {
   PilotWork work;
   for (const TransportPilot& t : pilots) {
@@ -117,13 +114,9 @@ PilotWork work_of(const std::array<TransportPilot, 2>& pilots) {
   }
   return work;
 }
-/// Returns the numbers of rays and shading records of a render without light paths, extrapolated
-/// from pilot renders with two ratios of light paths.
-PilotWork work_without(const TransportPilots& pilots) {
-  const PilotWork few = work_of(pilots.with[0]), many = work_of(pilots.with[1]);
-  const double a = double{kCandidateShares[0].paths()}, b = double{kCandidateShares[1].paths()};
-  const auto without_light_paths = [&](double x, double y) { return (b * x - a * y) / (b - a); };
-  return {without_light_paths(few.rays, many.rays), without_light_paths(few.records, many.records)};
+/// Returns a / b, or 0 if b is 0.
+double ratio_of(double a, double b) {
+  return b > 0 ? a / b : 0;
 }
 
 /// Squared relative noise of each pixel.
@@ -150,14 +143,25 @@ bool is_sharp(float roughness, bool varies) {
 
 }  // namespace
 
-TransportGain transport_gain(const TransportPilots& pilots, double longer) {
+PilotWork work_without(const TransportPilots& pilots) {
+  const PilotWork few = work_of(pilots.with[0]), many = work_of(pilots.with[1]);
+  const double a = double{kCandidateShares[0].paths()}, b = double{kCandidateShares[1].paths()};
+  const auto without_light_paths = [&](double x, double y) { return (b * x - a * y) / (b - a); };
+  return {without_light_paths(few.rays, many.rays), without_light_paths(few.records, many.records)};
+}
+
+TransportGain transport_gain(const TransportPilots& pilots, const PilotWork& without,
+                             double longer) {
   const std::array<TransportPilot, 2>& most = pilots.with[kCandidateShares.size() - 1];
   const size_t pixels = most[0].beauty.size() / 3;
+  const auto is_candidate = [](const auto& with) { return !with[0].beauty.empty(); };
+  const auto candidates = std::ranges::count_if(pilots.with, is_candidate);
   std::vector<double> mean(pixels);
   for (size_t i = 0; i < pixels; ++i)
     for (const auto& with : pilots.with)
       for (const TransportPilot& t : with)
-        mean[i] += 0.5 / kCandidateShares.size() * double{brightness(t.beauty, i)};
+        if (!t.beauty.empty())
+          mean[i] += 0.5 / static_cast<double>(candidates) * double{brightness(t.beauty, i)};
   const std::vector<double> scale = inverse_squares(mean, pilots.width);
   const auto squared = [](double d) { return d * d; };
   PixelNoise camera(pixels), left(pixels);
@@ -169,14 +173,14 @@ TransportGain transport_gain(const TransportPilots& pilots, double longer) {
     const double bound = kMaxLost * std::max(0.0, l0 * l1) * longer;
     left[i] = std::min(pilots.variance[i] / kTransportSamples, bound) * scale[i];
   }
-  const PilotWork without = work_without(pilots);
   const double path_cost = without.cost(kPathVertex);
-  const double all_without = (sum(camera) + sum(left)) * path_cost;
-  const double most_without =
-      (sum_of_most(std::move(camera)) + sum_of_most(std::move(left))) * path_cost;
   TransportGain best;
+  best.without.all = (sum(camera) + sum(left)) * path_cost;
+  best.without.of_most =
+      (sum_of_most(std::move(camera)) + sum_of_most(std::move(left))) * path_cost;
   for (size_t k = 0; k < kCandidateShares.size(); ++k) {
     const auto& with = pilots.with[k];
+    if (!is_candidate(with)) continue;
     PixelNoise noise(pixels);
     for (size_t i = 0; i < pixels; ++i)
       noise[i] = 0.5 * scale[i] *
@@ -186,12 +190,27 @@ TransportGain transport_gain(const TransportPilots& pilots, double longer) {
     if (pilots.merges)
       cost += kMergedPath * kTransportSamples * static_cast<double>(pixels) +
               kMergedVertex * (work.records - without.records);
-    const double all = sum(noise) * cost, of_most = sum_of_most(std::move(noise)) * cost;
-    const double gain =
-        std::max(all > 0 ? all_without / all : 0, of_most > 0 ? most_without / of_most : 0);
-    if (gain > best.gain) best = {gain, kCandidateShares[k]};
+    PilotError error;
+    error.all = sum(noise) * cost;
+    error.of_most = sum_of_most(std::move(noise)) * cost;
+    const double gain = std::max(ratio_of(best.without.all, error.all),
+                                 ratio_of(best.without.of_most, error.of_most));
+    if (gain <= best.gain) continue;
+    best.gain = gain;
+    best.share = kCandidateShares[k];
+    best.with = error;
   }
   return best;
+}
+
+double merging_gain(const TransportGain& merged, const TransportGain& unmerged) {
+  const auto gain = [](double with, double hidden, double merged_with) {
+    return ratio_of(with + std::max(hidden, 0.0), merged_with);
+  };
+  return std::max(
+      gain(unmerged.with.all, merged.without.all - unmerged.without.all, merged.with.all),
+      gain(unmerged.with.of_most, merged.without.of_most - unmerged.without.of_most,
+           merged.with.of_most));
 }
 
 bool focuses_light(const Scene& scene) {
@@ -205,6 +224,42 @@ bool focuses_light(const Scene& scene) {
            (coats && is_sharp(m.clearcoat_roughness, m.has_texture(Input::kClearcoatRoughness)));
   });
 }
+
+namespace {
+
+/// Returns whether the camera may see caustics in a mirror or through glass, where camera paths
+/// have only delta bounces.
+bool shows_caustics(const Scene& scene) {
+  return std::any_of(scene.materials().begin(), scene.materials().end(), [](const Material& m) {
+    const auto smooth = [](float roughness, bool varies) {
+      return varies || alpha_from_roughness(roughness) < kDeltaAlpha;
+    };
+    if (!has_trait(m.program, program_trait::kGlossy)) return false;
+    return m.graph != kNoGraph || smooth(m.roughness, m.has_texture(Input::kRoughness)) ||
+           (m.clearcoat > 0 && smooth(m.clearcoat_roughness, false));
+  });
+}
+
+/// Renders the pilots with `small` for the candidate ratios from number `first` on. `unit` is the
+/// brightness of the scene.
+TransportPilots render_pilots(Settings small, double unit, size_t first, const RenderPilot& render,
+                              const std::function<bool()>& stopped) {
+  TransportPilots pilots;
+  pilots.width = small.width;
+  pilots.merges = small.used_merge_radius() > 0;
+  small.seed = kTransportSeeds[0];
+  const TransportPilot squares = render(small, kCandidateShares.back(), true);
+  for (size_t k = first; k < kCandidateShares.size(); ++k)
+    for (size_t i = 0; i < kTransportSeeds.size(); ++i) {
+      small.seed = kTransportSeeds[i];
+      if (!stopped()) pilots.with[k][i] = render(small, kCandidateShares[k], false);
+    }
+  for (size_t i = 0; i < squares.beauty.size() / 3; ++i)
+    pilots.variance.push_back(unit * brightness(squares.by_light_paths, i));
+  return pilots;
+}
+
+}  // namespace
 
 TransportChoice choose_transport(const Scene& scene, const Settings& settings, uint64_t samples,
                                  const RenderPilot& render, const std::function<bool()>& stopped) {
@@ -238,28 +293,30 @@ TransportChoice choose_transport(const Scene& scene, const Settings& settings, u
     choice.why = "too few samples to find out whether light paths pay";
     return choice;
   }
-  Settings small = pilot_settings(settings, width, height);
-  TransportPilots pilots;
-  pilots.width = width;
-  pilots.merges = settings.merge_radius > 0;
-  small.seed = kTransportSeeds[0];
-  const TransportPilot squares = render(small, kCandidateShares.back(), true);
-  for (size_t k = 0; k < kCandidateShares.size(); ++k)
-    for (size_t i = 0; i < kTransportSeeds.size(); ++i) {
-      small.seed = kTransportSeeds[i];
-      if (!stopped()) pilots.with[k][i] = render(small, kCandidateShares[k], false);
-    }
+  const Settings small = pilot_settings(settings, width, height);
+  const double unit = scene_brightness(scene);
+  const TransportPilots pilots = render_pilots(small, unit, 0, render, stopped);
+  TransportPilots merged;
+  Settings merging = settings;
+  merging.merge_radius = 1.f;
+  if (!settings.merge_radius && shows_caustics(scene) && light_path_conflict(merging).what.empty())
+    merged = render_pilots(pilot_settings(merging, width, height), unit,
+                           kCandidateShares.size() - 1, render, stopped);
   choice.seconds = seconds_since(start);
   if (stopped()) {
     choice.why = "a trial took too much of the time limit";
     return choice;
   }
-  const double unit = scene_brightness(scene);
-  for (size_t i = 0; i < squares.beauty.size() / 3; ++i)
-    pilots.variance.push_back(unit * brightness(squares.by_light_paths, i));
   const double pixels = double{1} * settings.width * settings.height;
   const double longer = static_cast<double>(samples) / pixels / kTransportSamples;
-  const TransportGain found = transport_gain(pilots, longer);
+  const PilotWork without = work_without(pilots);
+  TransportGain found = transport_gain(pilots, without, longer);
+  if (merged.width > 0) {
+    const TransportGain by_merging = transport_gain(merged, without, longer);
+    choice.merges =
+        by_merging.gain >= kMinLightPathGain && merging_gain(by_merging, found) >= kMinMergingGain;
+    if (choice.merges) found = by_merging;
+  }
   choice.gain = found.gain;
   choice.why =
       "by a trial of " + std::to_string(width) + " x " + std::to_string(height) + " pixels";

@@ -13,6 +13,12 @@
 /// computed from the numbers of rays and vertices at fixed costs. The gain in efficiency of a ratio
 /// with squared error e_s and cost c_s is
 ///   (e_camera + e_left) c / (e_s c_s).
+/// Caustics that the camera sees in mirrors or through glass are found by merging only
+/// (light_paths/merge_grid.h). In scenes with such surfaces, pilots with merging at the larger
+/// ratio follow. Without merging, the pilots do not show the squared error of these caustics, so it
+/// is the difference of the squared errors without light paths, p_merged - p, and merging gains
+///   (e_s c_s + max(p_merged - p, 0) c_s) / (e_merged c_merged).
+/// Merging blurs caustics by up to a pixel, and is used only for a large gain.
 /// The choice does not depend on seed, region, threads, waves or lanes, so that crops, resumed
 /// renders and merged renders use the same transport. Samples of the pilot do not contribute to the
 /// image.
@@ -34,7 +40,10 @@ namespace wavecomb {
 struct TransportChoice {
   Transport transport = Transport::kPath;
   LightPathShare share;  ///< for Transport::kLight
-  std::string why;       ///< reason for the choice, worded as a clause of a message
+  /// Whether light paths are merged, within a radius of one pixel. Only for settings without a
+  /// merge radius.
+  bool merges = false;
+  std::string why;  ///< reason for the choice, worded as a clause of a message
   /// Predicted efficiency relative to a render without light paths; 0 if not measured.
   double gain = 0;
   double seconds = 0;
@@ -69,7 +78,8 @@ TransportChoice choose_transport(const Scene& scene, const Settings& settings, u
 
 /// Results of the pilot renders, whose images are `width` pixels wide.
 struct TransportPilots {
-  /// Two pilot renders with different seeds for each ratio of light paths.
+  /// Two pilot renders with different seeds for each ratio of light paths. Ratios without images
+  /// are no candidates.
   std::array<TransportPilot, 2> with[kCandidateShares.size()];
   /// Estimated variance per sample of each pixel if only camera paths sampled the light that light
   /// paths now contribute.
@@ -77,12 +87,31 @@ struct TransportPilots {
   uint32_t width = 0;
   bool merges = false;
 };
+/// Numbers of rays and shading records of a pilot render.
+struct PilotWork {
+  double rays = 0, records = 0;
+
+  /// Returns the cost at the given cost of a record, in units of the cost of a ray.
+  double cost(double vertex) const { return rays + vertex * records; }
+};
+/// Returns the work of a render without light paths, extrapolated from the pilot renders with two
+/// ratios of light paths.
+PilotWork work_without(const TransportPilots& pilots);
+/// Squared relative error times cost, over all pixels and without the noisiest pixels.
+struct PilotError {
+  double all = 0, of_most = 0;
+};
 struct TransportGain {
   double gain = 0;  ///< efficiency of the best ratio, relative to a render without light paths
   LightPathShare share;
+  PilotError with, without;  ///< of the best ratio, and without light paths
 };
 /// Returns the predicted efficiency gain for a render with `longer` times as many samples as the
-/// pilots.
-TransportGain transport_gain(const TransportPilots& pilots, double longer);
+/// pilots. `without` is the work of a render without light paths.
+TransportGain transport_gain(const TransportPilots& pilots, const PilotWork& without,
+                             double longer);
+/// Returns the predicted efficiency of a render with merging, relative to the best ratio without
+/// merging.
+double merging_gain(const TransportGain& merged, const TransportGain& unmerged);
 
 }  // namespace wavecomb

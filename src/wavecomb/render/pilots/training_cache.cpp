@@ -15,7 +15,7 @@ namespace wavecomb {
 namespace {
 
 /// Version of the packed format. Increase this version when the format changes.
-constexpr uint32_t kCacheFormat = 3;
+constexpr uint32_t kCacheFormat = 4;
 
 class ByteWriter {
  public:
@@ -103,7 +103,7 @@ void pass_parts(Archive& archive, Parts& parts) {
 
 /// Serialized form of a TransportChoice.
 struct PackedChoice {
-  uint8_t is_there = 0, uses_light = 0;
+  uint8_t is_there = 0, uses_light = 0, merges = 0;
   int32_t share = 0;  ///< exponent of LightPathShare
   double gain = 0;
 };
@@ -112,6 +112,7 @@ template <typename Archive, typename Choice>
 void pass_choice(Archive& archive, Choice& choice) {
   archive.value(choice.is_there);
   archive.value(choice.uses_light);
+  archive.value(choice.merges);
   archive.value(choice.share);
   archive.value(choice.gain);
 }
@@ -171,8 +172,8 @@ std::vector<std::byte> packed_training(const GuidingTraining& training,
   writer.value(kCacheFormat);
   PackedChoice choice;
   if (transport)
-    choice = {1, uint8_t{transport->transport == Transport::kLight}, transport->share.exponent,
-              transport->gain};
+    choice = {1, uint8_t{transport->transport == Transport::kLight}, uint8_t{transport->merges},
+              transport->share.exponent, transport->gain};
   pass_choice(writer, choice);
   writer.value(uint8_t{training.statistics.paths > 0});
   if (training.statistics.paths == 0) return writer.take();
@@ -223,6 +224,7 @@ TransportChoice unpacked_transport(std::span<const std::byte> bytes) {
   if (packed.uses_light != 0) {
     choice.transport = Transport::kLight;
     choice.share.exponent = std::clamp(packed.share, -8, 8);
+    choice.merges = packed.merges != 0;
   }
   choice.gain = std::isfinite(packed.gain) ? std::max(0.0, packed.gain) : 0;
   return choice;
