@@ -123,6 +123,7 @@ nb::object transport_dict(const std::optional<TransportChoice>& choice) {
   d["chosen"] = is_light ? "light" : "path";
   d["why"] = choice->why;
   d["light_paths"] = is_light ? choice->share.paths() : 0.f;
+  d["merges"] = is_light && choice->merges;
   d["gain"] = choice->gain > 0 ? nb::cast(choice->gain) : nb::none();
   d["seconds"] = choice->seconds;
   return d;

@@ -62,7 +62,8 @@ def test_everything_is_among_the_scenes(tmp_path: Path) -> None:
         counts.update(set(make_scene(seed, folder).features))
     for feature in (
         "diffuse", "metal", "dielectric", "plastic", "principled", "openpbr", "presence",
-        "transparent", "transparency texture", "threshold", "opacity texture", "glow that is cut out", "glow texture", "textured",
+        "transparent", "transparency texture", "threshold", "opacity texture",
+        "glow that is cut out", "glow texture", "textured",
         "portal", "instances", "moving", "cage", "lightLink", "shadowLink", "multipliers",
         "meshlight light", "rect light", "disk light", "sphere light", "cylinder light",
         "distant light", "dome light", "cosine sampling", "hidden lights", "lens",

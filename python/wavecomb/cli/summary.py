@@ -175,6 +175,7 @@ def _transport_line(chosen: Mapping[str, Any]) -> str:
     line = f"transport {chosen['chosen']}"
     if chosen["chosen"] == "light":
         line += f", {chosen['light_paths']:g} light paths for each camera path"
+        line += ", merged within a pixel" if chosen["merges"] else ""
     line += f": {chosen['why']}"
     if chosen["gain"] is not None:
         line += f" in {chosen['seconds']:.2f} s, light paths are predicted to have "
