@@ -729,9 +729,14 @@ class Settings:
     light_splats: Literal["auto", "filtered", "pixel"]
     """How light paths add light to the pixels around a point that the camera sees. Default:
     auto."""
-    merge_radius: float
-    """Radius in pixels of path merging, which finds caustics seen in mirrors or through glass, but
-    blurs them. Default: never. 0: never."""
+    @property
+    def merge_radius(self) -> float:
+        """Radius in pixels of path merging, which finds caustics seen in mirrors or through glass, but
+        blurs them; by default, transport auto decides between 0 and 1. Default: depends on other
+        settings."""
+
+    @merge_radius.setter
+    def merge_radius(self, value: float | None) -> None: ...
     firefly: Literal["keep", "reweight"]
     """Treatment of samples that are much brighter than their neighbours. Default: keep."""
     roulette_depth: int

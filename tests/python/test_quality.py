@@ -138,3 +138,31 @@ def test_a_room_is_guided_if_paths_start_at_the_camera(plain_room: Path) -> None
     scene = wavecomb.load(plain_room).scene
     stats = render(scene, spp=256, region=(0, 0, 4, 4), transport="path").stats
     assert stats["guiding"]["used"] and stats["guiding"]["gain"] >= 1.25
+
+
+@pytest.mark.slow
+def test_merging_is_decided_alike_for_all_parts_and_schedules(tmp_path: Path) -> None:
+    """The prism has caustics behind glass, which merging finds."""
+    path = tmp_path / "prism.usdc"
+    write_scene("prism", path)
+    prism = wavecomb.load(path).scene
+    first = render(prism)
+    choice = first.stats["transport"]
+    assert (choice["chosen"], choice["merges"], choice["light_paths"]) == ("light", True, 1)
+    for way in ({"threads": 1, "wave_size": 100, "policy": "material"}, {"lanes": 1}):
+        assert np.array_equal(render(prism, **way).beauty, first.beauty), way
+    wider = render(prism, region=(50, 100, 76, 120))
+    assert np.array_equal(wider.beauty[:16, 10:26], first.beauty)
+    again = _core.render(prism, _core.Settings(**PART), learned=first.learned)
+    assert np.array_equal(again.beauty, first.beauty)
+    stop = StopAt(1)
+    _core.render(prism, _core.Settings(**PART), watcher=stop, interval=0.001)
+    resumed = _core.render(prism, _core.Settings(**PART), state=stop.state)
+    assert np.array_equal(resumed.beauty, first.beauty)
+    unmerged = render(prism, merge_radius=0.0)
+    assert not unmerged.stats["transport"]["merges"]
+    assert not np.array_equal(unmerged.beauty, first.beauty)
+    # Merging does not go with errors of pixels, and light paths are used without merging.
+    for way in ({"noise": 0.05}, {"aovs": ("direct",)}):
+        other = render(prism, **way).stats["transport"]
+        assert (other["chosen"], other["merges"]) == ("light", False), way
