@@ -731,8 +731,8 @@ class Settings:
     auto."""
     @property
     def merge_radius(self) -> float:
-        """Radius in pixels of path merging, which finds caustics seen in mirrors or through glass, but
-        blurs them; by default, transport auto decides between 0 and 1. Default: depends on other
+        """Radius in pixels of path merging, which finds caustics in mirrors or behind glass, but
+        blurs them. By default, transport auto chooses 0 or 1. Default: depends on other
         settings."""
 
     @merge_radius.setter

@@ -68,7 +68,7 @@ def test_sun_through_panes(opacity: float, ior: float, tmp_path: Path, beauty: A
 
 
 def test_camera_sees_through_a_pane(tmp_path: Path, beauty: Any) -> None:
-    """A glowing floor seen straight through a pane that reflects a black room."""
+    """An emissive floor seen straight through a pane that reflects a black room."""
     # The view lies within one triangle of the pane, where decisions are stratified.
     eye = camera((2, 3, 0.001), (2, 0, 0), half=0.2)
     glow = material("Glow", "emissive", emissiveColor=(1, 2, 4))

@@ -225,8 +225,8 @@ std::vector<SettingInfo> work_settings() {
           "How light paths add light to the pixels around a point that the camera sees."),
       in_expectation(number_or_unset<&S::merge_radius>(
           "merge_radius", "Merge radius", 0, 64,
-          "Radius in pixels of path merging, which finds caustics seen in mirrors or through "
-          "glass, but blurs them; by default, transport auto decides between 0 and 1.",
+          "Radius in pixels of path merging, which finds caustics in mirrors or behind glass, but "
+          "blurs them. By default, transport auto chooses 0 or 1.",
           [](const S& s) -> SettingValue { return double{s.used_merge_radius()}; })),
       in_expectation(choice<&S::firefly>(
           "firefly", "Fireflies",
