@@ -729,14 +729,11 @@ class Settings:
     light_splats: Literal["auto", "filtered", "pixel"]
     """How light paths add light to the pixels around a point that the camera sees. Default:
     auto."""
-    @property
-    def merge_radius(self) -> float:
-        """Radius in pixels of path merging, which finds caustics in mirrors or behind glass, but
-        blurs them. By default, transport auto chooses 0 or 1. Default: depends on other
-        settings."""
-
-    @merge_radius.setter
-    def merge_radius(self, value: float | None) -> None: ...
+    merge_radius: float
+    """Radius in pixels of path merging, which finds caustics in mirrors, but blurs them. Default:
+    0."""
+    auto_merge: Literal["off", "on"]
+    """Whether light paths are merged if pilot renders predict a gain. Default: on."""
     firefly: Literal["keep", "reweight"]
     """Treatment of samples that are much brighter than their neighbours. Default: keep."""
     roulette_depth: int

@@ -67,7 +67,8 @@ class SettingKeywords(TypedDict, total=False):
     transport: Literal["path", "light", "auto", "bdpt"]
     light_aim: Literal["off", "on"]
     light_splats: Literal["auto", "filtered", "pixel"]
-    merge_radius: float | None
+    merge_radius: float
+    auto_merge: Literal["off", "on"]
     firefly: Literal["keep", "reweight"]
     roulette_depth: int
     light_selection: Literal["auto", "tree", "power"]

@@ -131,7 +131,7 @@ TEST(Programs, WhatIsNotReflectedPassesStraight) {
           const PrincipledLayers<float, kAllParts> layers(params, false);
           for (const float z : {0.2f, 0.6f, 1.f}) {
             const Vec straight = layers.straight(z);
-            EXPECT_NEAR(passing_probability<float>(straight), straight.x, 1e-5f);
+            EXPECT_NEAR(layers.passing_probability(straight), straight.x, 1e-5f);
             const double whole = furnace(bsdf, direction(z, 1), 4000) + double{straight.x};
             EXPECT_LT(whole, 1.015) << opacity << " " << roughness << " " << coat << " " << z;
             // Where a surface is partly metallic, its base absorbs light.

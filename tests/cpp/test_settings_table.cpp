@@ -49,7 +49,7 @@ TEST(SettingsTable, SettingsThatChangeTheExpectationAreMarked) {
       "firefly",      "fresnel",        "height", "max_depth", "overscan",
       "merge_radius", "texture_filter", "width"};
   EXPECT_EQ(marked, known);
-  EXPECT_EQ(setting_table().size(), 49u) << "is the expectation another with the new setting?";
+  EXPECT_EQ(setting_table().size(), 50u) << "is the expectation another with the new setting?";
 }
 
 TEST(SettingsTable, WhatIsBeyondIsRefused) {

@@ -159,7 +159,7 @@ def test_merging_is_decided_alike_for_all_parts_and_schedules(tmp_path: Path) ->
     _core.render(prism, _core.Settings(**PART), watcher=stop, interval=0.001)
     resumed = _core.render(prism, _core.Settings(**PART), state=stop.state)
     assert np.array_equal(resumed.beauty, first.beauty)
-    unmerged = render(prism, merge_radius=0.0)
+    unmerged = render(prism, auto_merge="off")
     assert not unmerged.stats["transport"]["merges"]
     assert not np.array_equal(unmerged.beauty, first.beauty)
     # Merging does not go with errors of pixels, and light paths are used without merging.

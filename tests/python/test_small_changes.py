@@ -221,8 +221,8 @@ bool is_ring_delta(LightKind kind, const detail::LightReader<float>& light) {
 
 SETTING: Change = {
     f"{CORE}/core/settings.h": (
-        "  std::optional<float> merge_radius;\n",
-        "  std::optional<float> merge_radius;\n"
+        "  float merge_radius = 0;\n",
+        "  float merge_radius = 0;\n"
         "  float tea_time = 4.5f;  ///< in hours; 0 means never\n",
     ),
     f"{CORE}/core/settings_table.cpp": (
@@ -259,8 +259,8 @@ OF_TECHNIQUE = aov(
 # A longest connection.
 OF_LIGHT_PATHS: Change = {
     f"{CORE}/core/settings.h": (
-        "  std::optional<float> merge_radius;\n",
-        "  std::optional<float> merge_radius;\n"
+        "  float merge_radius = 0;\n",
+        "  float merge_radius = 0;\n"
         "  float longest_connection = 0;  ///< 0 means no limit\n",
     ),
     f"{CORE}/core/settings_table.cpp": (

@@ -37,10 +37,13 @@ def test_auto_uses_light_paths_for_caustics_alike_for_all_schedules(caustics: Pa
     for way in (
         {"threads": 1, "wave_size": 100, "policy": "material"},
         {"lanes": 1, "seed": 7, "region": (3, 3, 9, 9), "crop": True},
-        {"noise": 0.1},
     ):
         other = chosen(stage, **way)
         assert {**other, "seconds": 0} == {**choice, "seconds": 0}
+    # Merging does not go with noise targets.
+    limited, forced = chosen(stage, noise=0.1), chosen(stage, auto_merge="off")
+    assert {**limited, "seconds": 0} == {**forced, "seconds": 0}
+    assert not forced["merges"]
 
 
 @pytest.mark.parametrize(

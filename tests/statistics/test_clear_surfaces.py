@@ -147,3 +147,70 @@ def test_clear_surfaces_are_unbiased(settings: dict[str, Any], tmp_path: Path, b
     a = batches(lambda seed: beauty(stage, 32, 32, seed=seed, **plain, **settings), 12)
     b = batches(lambda seed: beauty(stage, 32, 64, seed=seed, **plain), 12, 500)
     assert_agree(f"clear surfaces {'-'.join(settings.values())}", a, b)
+
+
+@pytest.mark.parametrize("mode", ["transparent", "presence"])
+def test_shadow_colours_behind_clear_surfaces(mode: str, tmp_path: Path, beauty: Any) -> None:
+    """Light that a surface holds back is tinted by the shadow colour t: t + (1 - t) T."""
+    eye = camera((6, 0.4, 0), (0, 0, 0), half=1e-3)
+    half = material("Half", "principled", diffuseColor=(0, 0, 0), roughness=0.0, opacity=0.5)
+    if mode == "presence":
+        shader = 'uniform token info:id = "UsdPreviewSurface"'
+        half = half.replace(shader, shader + '\ntoken inputs:opacityMode = "presence"')
+    tint = np.array((0.0, 0.25, 0.5))
+    apis = '"Sun" ( prepend apiSchemas = ["ShadowAPI"] ) {'
+    sun = SUN.replace('"Sun" {', apis).replace(
+        "float inputs:intensity",
+        "color3f inputs:shadow:color = (0, 0.25, 0.5)\nfloat inputs:intensity",
+    )
+    floors = []
+    for name, prims in (("bare", ()), ("covered", (pane("Pane", 1.0, "Half"),))):
+        stage = write_stage(
+            tmp_path / f"{name}.usda", eye, sun, WHITE, half, ground("White"), *prims
+        )
+        floors.append(beauty(stage, 4, 4, max_depth=1).mean((0, 1)))
+        reference = beauty(stage, 4, 4, max_depth=1, integrator="reference").mean((0, 1))
+        np.testing.assert_array_equal(floors[-1], reference)
+    passed = 0.5 if mode == "presence" else transmission(0.5, 1.5, np.cos(np.pi / 6))
+    np.testing.assert_allclose(floors[1] / floors[0], tint + (1 - tint) * passed, rtol=3e-4)
+
+
+@pytest.mark.parametrize("ior", [1.0, 1.001, 1.5])
+def test_clear_surfaces_emit(ior: float, tmp_path: Path, beauty: Any) -> None:
+    """A surface of opacity 0 is as bright as its emission, even if all light passes."""
+    eye = camera((2, 3, 0.001), (2, 0, 0), half=0.2)
+    glow = material(
+        "Glow", "principled", diffuseColor=(0, 0, 0), emissiveColor=(1, 2, 4), opacity=0.0, ior=ior
+    )
+    black = material("Black", "diffuse", diffuseColor=(0, 0, 0))
+    stage = write_stage(
+        tmp_path / "stage.usda", eye, glow, black, ground("Black"), pane("Pane", 1.0, "Glow")
+    )
+    image = beauty(stage, 8, 256, max_depth=2)
+    np.testing.assert_allclose(image.mean((0, 1)), (1, 2, 4), rtol=5e-3)
+
+
+@pytest.mark.parametrize("mode", ["transparent", "presence"])
+def test_points_are_crossed_twice(mode: str, tmp_path: Path, beauty: Any) -> None:
+    """Camera and shadow rays cross the surface of a point twice, like that of a sphere."""
+    half = material("Half", "principled", diffuseColor=(0, 0, 0), roughness=0.0, ior=1, opacity=0.3)
+    if mode == "presence":
+        shader = 'uniform token info:id = "UsdPreviewSurface"'
+        half = half.replace(shader, shader + '\ntoken inputs:opacityMode = "presence"')
+    dots = """def Points "Dot" ( prepend apiSchemas = ["MaterialBindingAPI"] ) {
+        point3f[] points = [(0, 1.5, 0)]
+        float[] widths = [2]
+        rel material:binding = </World/Half>
+    }"""
+    glow = material("Glow", "emissive", emissiveColor=(1, 1, 1))
+    down = camera((0, 6, 0.001), (0, 0, 0), half=1e-3)
+    seen = write_stage(tmp_path / "seen.usda", down, glow, half, ground("Glow"), dots)
+    across = camera((6, 0.4, 0), (0, 0, 0), half=1e-3)
+    zenith = light("Distant", "Sun", colour=(3, 3, 3), angle=0.0, transform=turned(x=-90))
+    lit = [
+        write_stage(tmp_path / f"{len(x)}.usda", across, zenith, WHITE, half, ground("White"), *x)
+        for x in ((), (dots,))
+    ]
+    bare, dimmed = (beauty(stage, 4, 4, max_depth=1).mean() for stage in lit)
+    np.testing.assert_allclose(dimmed / bare, 0.7**2, rtol=1e-3)
+    np.testing.assert_allclose(beauty(seen, 8, 512, max_depth=0).mean(), 0.7**2, rtol=0.02)

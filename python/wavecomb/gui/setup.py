@@ -20,8 +20,8 @@ NOT_LIVE = ("progressive", "crop")
 """Settings that do not apply to live renders, which always use progressive passes and the whole
 image."""
 NOT_IN_PREVIEWS = (
-    "adaptive", "noise", "time_limit", "guiding", "transport", "merge_radius", "firefly",
-    "integrator", "allocate",
+    "adaptive", "noise", "time_limit", "guiding", "transport", "merge_radius", "auto_merge",
+    "firefly", "integrator", "allocate",
 )  # fmt: skip
 """Settings that keep their default values while reduced images are rendered."""
 PREVIEW_DEPTH = 3

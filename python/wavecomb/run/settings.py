@@ -146,7 +146,8 @@ def image_bytes(settings: Settings, aovs: Sequence[str], light_groups: int = 1) 
         sums = 1 + has_error_layers(settings) + aov_names.splat_layers(aovs, light_groups)
         # Each pixel also needs 4 bytes for the number of traced samples of a light path index.
         each += _SPLAT_BYTES_PER_PIXEL * sums + 4
-        may_merge = settings.merge_radius > 0 or settings.transport == "auto"
+        chosen = settings.transport == "auto" and settings.auto_merge != "off"
+        may_merge = settings.merge_radius > 0 or chosen
         each += _VISIBLE_BYTES_PER_PIXEL * may_merge
     if aov_names.DEEP in settings.aovs:
         each += _DEEP_BYTES_PER_PIXEL + _DEEP_BYTES_PER_SAMPLE * settings.deep_samples

@@ -2,6 +2,7 @@
 #include "wavecomb/accel/presence.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "wavecomb/core/encoding/hash.h"
@@ -29,20 +30,26 @@ void mark_invisible(const Scene& scene, std::vector<uint8_t>& filtered) {
 }
 
 /// Decides at random whether a surface stops a ray, with the given probability.
-bool stops_at_random(float probability, const PresenceQuery& at, const PresenceKeys& keys) {
+bool stops_at_random(const SceneView& scene, float probability, const PresenceQuery& at,
+                     const PresenceKeys& keys) {
   if (probability >= 1.f) return true;
   if (!(probability > 0.f)) return false;
   const SampleKey<float> path{keys.pixel_hash[size_t{at.slot} * keys.stride],
                               keys.sample[size_t{at.slot} * keys.stride]};
-  const uint32_t where = hash_u32(at.instance * 0x9e3779b9u + at.mesh, at.prim);
+  uint32_t where = hash_u32(at.instance * 0x9e3779b9u + at.mesh, at.prim);
+  // A ray may enter and leave the same curve or point, by independent decisions.
+  const uint32_t flags = scene.meshes[at.mesh].flags;
+  if ((flags & kIsCurved) != 0 && (flags & kIsGaussianSplat) == 0)
+    where = hash_u32(hash_u32(where, std::bit_cast<uint32_t>(at.u)), std::bit_cast<uint32_t>(at.v));
   return stratified_1d<float>(path, hash_u32(where, keys.salt)) < probability;
 }
 
 /// Returns whether a surface stops a ray that it stops with the given probability on average. A
 /// shadow ray with an optical depth passes, and its optical depth increases. The sums are integers,
 /// so that they do not depend on the order of hits.
-bool stops(float probability, const PresenceQuery& at, const PresenceKeys& keys) {
-  if (!keys.optical_depth) return stops_at_random(probability, at, keys);
+bool stops(const SceneView& scene, float probability, const PresenceQuery& at,
+           const PresenceKeys& keys) {
+  if (!keys.optical_depth) return stops_at_random(scene, probability, at, keys);
   if (probability >= 1.f) return true;
   if (!(probability > 0.f)) return false;
   uint32_t& sum = keys.optical_depth[at.slot];
@@ -118,7 +125,8 @@ bool casts_shadow(const SceneView& scene, uint32_t instance, uint32_t geom, uint
 bool is_present(const SceneView& scene, const PresenceQuery& at, const PresenceKeys& keys) {
   if (scene.has_curves && (scene.meshes[at.mesh].flags & kIsGaussianSplat) != 0)
     return stops_at_random(
-        gaussian_splat_alpha(gaussian_splat_of(scene, at.mesh, at.prim), at.u, at.v), at, keys);
+        scene, gaussian_splat_alpha(gaussian_splat_of(scene, at.mesh, at.prim), at.u, at.v), at,
+        keys);
   const uint32_t material =
       hit_material<float>(scene, scene.instances[at.instance].material, at.mesh, at.prim, true);
   // Medium boundaries do not stop shadow rays. The transmittance of a shadow ray is computed
@@ -128,7 +136,7 @@ bool is_present(const SceneView& scene, const PresenceQuery& at, const PresenceK
   if (keys.passes_straight && (flags & kTransmitsStraight) != 0) {
     const MeshHit<float> hit{at.instance, at.mesh, at.prim, at.u, at.v, at.time};
     const auto straight = straight_transmission<float>(scene, hit, material, at.dir, true);
-    return stops(1.f - straight.probability, at, keys);
+    return stops(scene, 1.f - straight.probability, at, keys);
   }
   if ((flags & kPresence) == 0) return true;
   const float opacity =
@@ -138,7 +146,7 @@ bool is_present(const SceneView& scene, const PresenceQuery& at, const PresenceK
                          .mesh_position = {at.mesh, at.prim, at.u, at.v},
                          .uv = hit_uv<float>(scene.meshes, at.mesh, at.prim, at.u, at.v, true)},
                         true);
-  return stops(opacity, at, keys);
+  return stops(scene, opacity, at, keys);
 }
 
 bool accepts_hit(const SceneView& scene, const PresenceQuery& at, const PresenceKeys& keys) {

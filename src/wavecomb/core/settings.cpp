@@ -11,7 +11,7 @@ LightPathConflict light_path_conflict(const Settings& s) {
   if (s.clamp_indirect > 0) return {"clamp_indirect", "clamp_indirect 0"};
   if (s.cosine_sampling) return {"cosine_sampling", "none"};
   if (s.aovs.has(Aov::kDeep)) return {"the AOV deep, which lacks light path contributions", "none"};
-  if (s.used_merge_radius() <= 0) return {};
+  if (s.merge_radius <= 0) return {};
   if (s.connects()) return {"merge_radius", "merge_radius 0"};
   if (s.needs_error()) return {"merge_radius and errors of pixels", "merge_radius 0"};
   for (const Aov aov : {Aov::kDirect, Aov::kIndirect, Aov::kLightGroups, Aov::kExpressions})

@@ -53,9 +53,11 @@ struct Settings {
   bool light_aim = true;
   LightSplats light_splats = LightSplats::kAuto;
   /// Merge radius in pixels, within which light paths end at points that the camera sees by
-  /// specular reflection or refraction (light_paths/merge_grid.h). 0 means no merging. If empty,
-  /// Transport::kAuto decides (light_paths/render/transport_choice.h).
-  std::optional<float> merge_radius;
+  /// specular reflection or refraction (light_paths/merge_grid.h). 0 means no merging, except where
+  /// Transport::kAuto chooses it.
+  float merge_radius = 0;
+  /// Whether Transport::kAuto may merge within one pixel (light_paths/render/transport_choice.h).
+  bool auto_merge = true;
   Firefly firefly = Firefly::kKeep;
   /// AOVs to store. They do not change the beauty, except through LightSplats::kAuto.
   AovSet aovs;
@@ -111,13 +113,12 @@ struct Settings {
   float cost_weight = 0.3f;  ///< weight of a pass in the moving average of costs, 0 to 1
 
   float used_filter_width() const { return filter_width.value_or(default_filter_width(filter)); }
-  float used_merge_radius() const { return merge_radius.value_or(0.f); }
   bool joins_light() const { return transport == Transport::kLight || connects(); }
   /// Returns whether vertices of camera paths are connected to vertices of light paths.
   bool connects() const { return transport == Transport::kBdpt; }
   /// Returns whether light paths are merged with points that the camera sees by specular reflection
   /// or refraction.
-  bool merges() const { return transport == Transport::kLight && used_merge_radius() > 0; }
+  bool merges() const { return transport == Transport::kLight && merge_radius > 0; }
   /// Returns whether Russian roulette decides about shadow rays. Its threshold depends on the
   /// brightness of the image, which the calibration of light weights estimates.
   bool saves_shadow_rays() const {

@@ -223,11 +223,13 @@ std::vector<SettingInfo> work_settings() {
            {"filtered", "Adds light to all pixels nearby, weighted by the pixel filter."},
            {"pixel", "Adds light to one random pixel, since denoisers need independent noise."}},
           "How light paths add light to the pixels around a point that the camera sees."),
-      in_expectation(number_or_unset<&S::merge_radius>(
+      in_expectation(number<&S::merge_radius>(
           "merge_radius", "Merge radius", 0, 64,
-          "Radius in pixels of path merging, which finds caustics in mirrors or behind glass, but "
-          "blurs them. By default, transport auto chooses 0 or 1.",
-          [](const S& s) -> SettingValue { return double{s.used_merge_radius()}; })),
+          "Radius in pixels of path merging, which finds caustics in mirrors, but blurs them.")),
+      choice<&S::auto_merge>("auto_merge", "Automatic merging",
+                             {{"off", "Only a merge radius above 0 merges."},
+                              {"on", "Transport auto may merge within one pixel."}},
+                             "Whether light paths are merged if pilot renders predict a gain."),
       in_expectation(choice<&S::firefly>(
           "firefly", "Fireflies",
           {{"keep", "Very bright samples keep their weight, so the image has no bias."},

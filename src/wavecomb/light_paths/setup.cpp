@@ -20,7 +20,7 @@ LightPathContext::LightPathContext(const Settings& settings, const LightSplatFil
       connects(settings.connects()),
       share(1.f / (static_cast<float>(settings.width) * static_cast<float>(settings.height) *
                    paths_per_sample)),
-      merge_scale(grid ? settings.used_merge_radius() / kConeShare : 0.f) {}
+      merge_scale(grid ? settings.merge_radius / kConeShare : 0.f) {}
 
 namespace {
 

@@ -193,6 +193,13 @@ struct Vertex {
 /// that the ray ends before the light's surface.
 inline constexpr float kShadowRayFraction = 0.9999f;
 
+/// Returns the fraction of a light's radiance that a shadow ray contributes, for a light whose
+/// shadows have the colour `tint` and partly transparent surfaces with transmittance `passed`.
+template <typename F>
+WAVECOMB_INLINE Color<F> tinted_transmittance(const Color<F>& tint, const F& passed) {
+  return tint + (Color<F>(F(1.f)) - tint) * passed;
+}
+
 /// Scales a contribution down to a luminance of at most `limit`, where 0 means no limit.
 /// Contributions that are not finite become 0.
 template <typename F>

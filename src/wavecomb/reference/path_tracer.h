@@ -139,10 +139,10 @@ class PathTracer : PathRecorder {
       const ShadedVertex<F> shaded{.path = path, .t = hit.t, .material = material, .result = v};
       const uint32_t group = events_.vertex<true, F>({depth, kSlot, key, shaded, aovs}, true);
       events_.end_depth(depth, 1);
-      const bool is_free = v.has_shadow && trace_shadow(key, depth, v, group);
+      const float passed = v.has_shadow ? trace_shadow(key, depth, v, group) : 0.f;
       joint_.use_vertex(depth, rays_);
       if (!probes_.empty() && aovs.light_weight >= 0.f)
-        record_choice(v, aovs, is_free ? luminance(v.direct) : 0.f);
+        record_choice(v, aovs, luminance(v.direct) * passed);
       if (!v.alive) return depth + 1;
       path = v.next;
       path.importance = importance;
@@ -188,16 +188,16 @@ class PathTracer : PathRecorder {
   }
 
   /// Traces the shadow ray of a vertex, and adds the vertex's light sample to the light group
-  /// `group`. Returns whether the ray is free.
-  bool trace_shadow(const SampleKey<F>& key, uint32_t depth, const VertexResult<F>& v,
-                    uint32_t group) {
+  /// `group`. Returns the result of SingleRays::unoccluded().
+  float trace_shadow(const SampleKey<F>& key, uint32_t depth, const VertexResult<F>& v,
+                     uint32_t group) {
     clock_.enter(Phase::kShadow);
     const bool links = context_.scene.lights.links.members != nullptr;
     const float passed = rays_.unoccluded(v.shadow_o, v.shadow_d, v.shadow_tfar, depth,
                                           links ? &v.shadow_set : nullptr);
     if (passed > 0.f || max_component(v.shadow_tint) > 0.f)
       add_direct(key, depth, v, passed, group);
-    return passed > 0.f;
+    return passed;
   }
 
   /// Runs the subsurface random walk of a ray that has entered a body. A ray that does not hit the
@@ -212,6 +212,7 @@ class PathTracer : PathRecorder {
     if constexpr (Media::kStreams) {
       PresenceKeys keys = rays_.keys();
       keys.object = &object;
+      keys.passes_straight = false;
       return media_.walk(passage_of(key, depth, path, hit), keys, path, hit, left_body);
     }
     return true;
@@ -242,7 +243,8 @@ class PathTracer : PathRecorder {
   void add_direct(const SampleKey<F>& key, uint32_t depth, const VertexResult<F>& v, float passed,
                   uint32_t group) {
     const bool is_free = passed > 0.f;
-    Color<F> c = is_free ? v.direct * passed : v.direct;
+    Color<F> c = v.direct;
+    if (is_free) c = c * tinted_transmittance<F>(v.shadow_tint, passed);
     if constexpr (Media::kAny) {
       const F t = v.shadow_tfar * (1.f / kShadowRayFraction);
       c = c * media_.template transmittance<F>(

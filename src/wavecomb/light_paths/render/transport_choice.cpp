@@ -236,7 +236,8 @@ bool shows_caustics(const Scene& scene) {
     };
     if (!has_trait(m.program, program_trait::kGlossy)) return false;
     return m.graph != kNoGraph || smooth(m.roughness, m.has_texture(Input::kRoughness)) ||
-           (m.clearcoat > 0 && smooth(m.clearcoat_roughness, false));
+           ((m.clearcoat > 0 || m.has_texture(Input::kClearcoat)) &&
+            smooth(m.clearcoat_roughness, m.has_texture(Input::kClearcoatRoughness)));
   });
 }
 
@@ -246,7 +247,7 @@ TransportPilots render_pilots(Settings small, double unit, size_t first, const R
                               const std::function<bool()>& stopped) {
   TransportPilots pilots;
   pilots.width = small.width;
-  pilots.merges = small.used_merge_radius() > 0;
+  pilots.merges = small.merge_radius > 0;
   small.seed = kTransportSeeds[0];
   const TransportPilot squares = render(small, kCandidateShares.back(), true);
   for (size_t k = first; k < kCandidateShares.size(); ++k)
@@ -299,7 +300,8 @@ TransportChoice choose_transport(const Scene& scene, const Settings& settings, u
   TransportPilots merged;
   Settings merging = settings;
   merging.merge_radius = 1.f;
-  if (!settings.merge_radius && shows_caustics(scene) && light_path_conflict(merging).what.empty())
+  if (settings.auto_merge && settings.merge_radius == 0 && shows_caustics(scene) &&
+      light_path_conflict(merging).what.empty())
     merged = render_pilots(pilot_settings(merging, width, height), unit,
                            kCandidateShares.size() - 1, render, stopped);
   choice.seconds = seconds_since(start);

@@ -40,8 +40,7 @@ namespace wavecomb {
 struct TransportChoice {
   Transport transport = Transport::kPath;
   LightPathShare share;  ///< for Transport::kLight
-  /// Whether light paths are merged, within a radius of one pixel. Only for settings without a
-  /// merge radius.
+  /// Whether light paths are merged within one pixel; only with Settings::auto_merge.
   bool merges = false;
   std::string why;  ///< reason for the choice, worded as a clause of a message
   /// Predicted efficiency relative to a render without light paths; 0 if not measured.

@@ -20,6 +20,10 @@ inline constexpr uint32_t kPrincipledInputs =
     input_bit(Input::kMetallic) | input_bit(Input::kClearcoat) |
     input_bit(Input::kClearcoatRoughness) | input_bit(Input::kOpacity) | input_bit(Input::kNormal);
 
+/// Upper limit of the probability with which rays pass an emissive surface, whose emission is
+/// divided by the probability of hitting it.
+inline constexpr float kMaxEmissivePassing = 0.75f;
+
 /// Parameters of the layers of UsdPreviewSurface at a hit: clearcoat over a specular interface over
 /// a base. Shading (programs/principled.h) and ray traversal (lobes/straight_transmission.h) use
 /// the same layers. `kParts` are the features of the program variant (Part).
@@ -51,7 +55,11 @@ class PrincipledLayers {
     }
     if constexpr (kMetal || kStraight)
       diffuse_ = diffuse_ * F(F(1.f - metallic) * (kStraight ? params.opacity : F(1.f)));
-    if constexpr (kStraight) transparency_ = F(1.f - params.opacity);
+    if constexpr (kStraight) {
+      transparency_ = F(1.f - params.opacity);
+      const Mask<F> emits = Mask<F>((params.flags & UInt<F>(uint32_t{kEmits})) != UInt<F>(0u));
+      most_passing_ = select(emits, F(kMaxEmissivePassing), F(1.f));
+    }
     interface_ = CoatFresnel<F>(ior, exact);
     const F alpha = alpha_from_roughness(roughness_);
     smooth_ = alpha < kDeltaAlpha;
@@ -87,6 +95,13 @@ class PrincipledLayers {
     return (Color<F>(F(1.f)) - Color<F>(specular_albedo(z))) * F(below * transparency_);
   }
 
+  /// Returns the probability with which ray traversal lets rays pass layers that transmit the
+  /// fraction `straight`: its smallest component, with a limit for emissive surfaces. The BSDF
+  /// transmits the rest.
+  F passing_probability(const Color<F>& straight) const {
+    return clamp(min(straight.x, min(straight.y, straight.z)), F(0.f), most_passing_);
+  }
+
  protected:
   /// Returns whether any lane has a clearcoat.
   bool has_coat() const {
@@ -101,7 +116,7 @@ class PrincipledLayers {
     return rough_.albedo(f0_, multiple_, z, select(smooth_, F(0.f), lost_(z)));
   }
 
-  F roughness_, coat_roughness_, clearcoat_, transparency_;
+  F roughness_, coat_roughness_, clearcoat_, transparency_, most_passing_;
   CoatFresnel<F> coat_, interface_;
   Tint f0_, average_, multiple_;
   Color<F> diffuse_;
@@ -110,12 +125,5 @@ class PrincipledLayers {
   Ggx<F> ggx_, coat_ggx_;
   Mask<F> smooth_, coat_smooth_;
 };
-
-/// Returns the probability with which rays pass straight through layers that let the fraction
-/// `straight` of the light pass: its smallest component. The BSDF transmits the rest.
-template <typename F>
-inline F passing_probability(const Color<F>& straight) {
-  return max(min(straight.x, min(straight.y, straight.z)), F(0.f));
-}
 
 }  // namespace wavecomb

@@ -3,8 +3,9 @@
 ///
 /// Where opacity is below 1, the surface lets the fraction T of the light pass without a change of
 /// direction (PrincipledLayers::straight). Traversal lets each ray pass with the probability T
-/// (its smallest component, if T is coloured), and multiplies the contribution of a shadow ray by
-/// T instead. A path that is stopped, with the probability 1 - T, has the throughput
+/// (its smallest component, if T is coloured, and at most kMaxEmissivePassing on emissive
+/// surfaces), and multiplies the contribution of a shadow ray by T instead. A path that is stopped,
+/// with the probability 1 - T, has the throughput
 ///   T_k <- T_k / (1 - T),
 /// and its BSDF has no straight transmission. So straight transmission is neither a vertex nor a
 /// bounce: origin, density and MIS weight of a ray remain those of the vertex where it started, and
@@ -57,7 +58,7 @@ template <typename F>
   params.opacity = opacity;
   const PrincipledLayers<F, kMetalPart | kCoatPart | kTransmissionPart> layers(params, false);
   const F z = min(abs(dot(dir, s.unadjusted)), F(1.f));
-  return {select(passing, passing_probability<F>(layers.straight(z)), F(0.f)), opacity};
+  return {select(passing, layers.passing_probability(layers.straight(z)), F(0.f)), opacity};
 }
 
 }  // namespace wavecomb

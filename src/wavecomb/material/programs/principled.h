@@ -33,7 +33,7 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F>,
   using Layers::kCoat;
   using Layers::kMetal;
   using typename Layers::Tint;
-  /// Whether the BSDF may transmit light, because layers pass colours differently.
+  /// Whether the BSDF may transmit light: layers pass colours differently, or the surface emits.
   static constexpr bool kTinted = Layers::kStraight && kMetal;
 
  public:
@@ -220,8 +220,8 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F>,
 
   /// Returns the part of straight transmission that ray traversal leaves to the BSDF. A remainder
   /// of rounding errors is ignored.
-  static Color<F> tinted_transmission(const Color<F>& straight) {
-    const Color<F> rest = straight - Color<F>(passing_probability<F>(straight));
+  Color<F> tinted_transmission(const Color<F>& straight) const {
+    const Color<F> rest = straight - Color<F>(passing_probability(straight));
     const Mask<F> real = max_component(rest) > F(1e-5f * max_component(straight));
     return select<F>(real, rest, Color<F>(F(0.f)));
   }
@@ -240,6 +240,7 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F>,
   using Layers::interface_;
   using Layers::lost_;
   using Layers::multiple_;
+  using Layers::passing_probability;
   using Layers::roughness_;
   using Layers::smooth_;
   using Layers::specular_albedo;

@@ -116,6 +116,7 @@ class SubsurfaceScattering {
     if (walk_queue.size() == 0) return;
     PresenceKeys keys = presence_keys(wave.pool, depth, false);
     // The field `receiver` of PathRow holds BodyEntry::body, as set by PathRow::set_entry().
+    keys.passes_straight = false;
     keys.object = &reinterpret_cast<const PathRow<float>*>(wave.pool.paths)->receiver;
     const auto leave = [&](const Mask<F>& lanes, const U& slot) {
       PathRow<F> path = load_row<PathRow, F>(wave.pool.paths, slot, lanes);

@@ -59,7 +59,7 @@ PlannedSettings Planner::plan(const Settings& settings, const RenderOptions& opt
   if (used.transport != Transport::kAuto) return planned;
   const TransportChoice choice = choose(used, options, stopped);
   used.transport = choice.transport;
-  if (choice.merges && !used.merge_radius) used.merge_radius = 1.f;
+  if (choice.merges && used.merge_radius == 0) used.merge_radius = 1.f;
   if (used.time_limit > 0)
     used.time_limit = std::max(1e-6f, used.time_limit - static_cast<float>(choice.seconds));
   used = without_open_choices(used);
@@ -111,7 +111,7 @@ TransportChoice Planner::choose(const Settings& settings, const RenderOptions& o
     TransportChoice earlier = unpacked_transport(options.learned);
     // The scene or the settings may have changed since the earlier render.
     Settings used = settings;
-    if (earlier.merges && !used.merge_radius) used.merge_radius = 1.f;
+    if (earlier.merges && used.merge_radius == 0) used.merge_radius = 1.f;
     if (earlier.transport == Transport::kPath ||
         (light_path_conflict(used).what.empty() && light_path_conflict(*scene_).what.empty()))
       return earlier;

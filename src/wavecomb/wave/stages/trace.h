@@ -84,26 +84,35 @@ inline void trace(Wave& wave, const WaveContext& context, uint32_t depth, const 
   wave.counts.add_rays(depth, q.size);
 }
 
-/// Multiplies the contributions of unblocked shadow rays by the transmittance of the partly
-/// transparent surfaces that the rays pass. Does not change the contributions of blocked rays.
+/// Multiplies the contributions of unblocked shadow rays by the transmittance T of the partly
+/// transparent surfaces that the rays pass. Light that these surfaces hold back is tinted: with
+/// shadow tints t, the factor is t + (1 - t) T. `tints` are PathPool::shadow_tints, or null. Does
+/// not change the contributions of blocked rays.
 template <typename F>
-[[gnu::noinline, gnu::cold]] void attenuate_by_surfaces(Wave& wave) {
+[[gnu::noinline, gnu::cold]] void attenuate_by_surfaces(Wave& wave, const float* tints) {
   using U = UInt<F>;
   const ShadowQueue& q = wave.shadows;
   for (size_t i = 0; i < q.size; i += kWidth<F>) {
     const Mask<F> free = first_lanes<F>(q.size - i) & Mask<F>(load<U>(q.occluded + i) == U(0u));
-    const U depth =
-        select(Mask<U>(free),
-               gather<U>(wave.pool.optical_depths, load<U>(q.slot + i), Mask<U>(free)), U(0u));
-    const F passed = surface_transmittance<F>(depth);
-    for (float* c : {q.r, q.g, q.b}) store(c + i, F(load<F>(c + i) * passed));
+    const Mask<U> on(free);
+    const U slot = load<U>(q.slot + i);
+    const U depth = select(on, gather<U>(wave.pool.optical_depths, slot, on), U(0u));
+    Color<F> tint(F(0.f));
+    if (tints) tint = load_row<RadianceRow, F>(tints, slot, free).sum;
+    const Color<F> passed = tinted_transmittance<F>(tint, surface_transmittance<F>(depth));
+    const auto dim = [&](float* c, const F& by) { store(c + i, F(load<F>(c + i) * by)); };
+    dim(q.r, passed.x);
+    dim(q.g, passed.y);
+    dim(q.b, passed.z);
   }
 }
 
 /// Tests the shadow rays for occlusion, and attenuates the contributions of rays that pass partly
-/// transparent surfaces. `uses_linking` is passed to presence_keys().
+/// transparent surfaces. `uses_linking` is passed to presence_keys(), and `tints` to
+/// attenuate_by_surfaces().
 template <typename F>
-void occlude(Wave& wave, const WaveContext& context, uint32_t depth, bool uses_linking) {
+void occlude(Wave& wave, const WaveContext& context, uint32_t depth, bool uses_linking,
+             const float* tints = nullptr) {
   const ShadowQueue& q = wave.shadows;
   const RaySpan rays{q.ox, q.oy,   q.oz,   q.dx,   q.dy,
                      q.dz, q.tfar, q.slot, q.size, fetch_times<F>(wave, q)};
@@ -118,7 +127,7 @@ void occlude(Wave& wave, const WaveContext& context, uint32_t depth, bool uses_l
   wave.aovs.spread_time(q.size, start, slot_of);
   wave.counts.add_shadow_rays(depth, q.size);
   if (wave.pool.optical_depths) [[unlikely]]
-    attenuate_by_surfaces<F>(wave);
+    attenuate_by_surfaces<F>(wave, tints);
 }
 
 /// Adds the contributions of unblocked shadow rays to the radiance of their paths, multiplied by
@@ -129,7 +138,8 @@ void shadow(Wave& wave, const WaveContext& context, uint32_t depth,
             [[maybe_unused]] const Media& media) {
   using U = UInt<F>;
   const ShadowQueue& q = wave.shadows;
-  occlude<F>(wave, context, depth, context.scene.lights.links.members != nullptr);
+  occlude<F>(wave, context, depth, context.scene.lights.links.members != nullptr,
+             wave.pool.shadow_tints);
   if constexpr (Media::kStreams)
     media.template attenuate_shadow_rays<F>(wave, depth, context.settings->sampler);
   const PathEvents events = wave.events(context);
