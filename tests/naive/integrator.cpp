@@ -228,8 +228,9 @@ class Integrator {
     const uint32_t material = material_of(hit);
     if ((scene_.materials.materials[material].flags & kTransmitsStraight) == 0) return Rgb(0.f);
     const MeshHit<F> on_mesh{hit.inst, mesh_of(hit), hit.prim, hit.u, hit.v, time_};
+    const auto cosine = [&](bool) { return straight_cosine<F>(at.s, ray.d); };
     const StraightTransmission<F> t =
-        straight_transmission<F>(scene_, on_mesh, material, ray.d, true);
+        straight_transmission<F>(scene_, on_mesh, material, cosine, true);
     at.params.opacity = t.opacity;
     if (t.probability == 0.f) return Rgb(0.f);
     Ray behind = ray;

@@ -135,7 +135,11 @@ bool is_present(const SceneView& scene, const PresenceQuery& at, const PresenceK
   const uint32_t flags = scene.materials.materials[material].flags;
   if (keys.passes_straight && (flags & kTransmitsStraight) != 0) {
     const MeshHit<float> hit{at.instance, at.mesh, at.prim, at.u, at.v, at.time};
-    const auto straight = straight_transmission<float>(scene, hit, material, at.dir, true);
+    const auto cosine = [&](bool lane) {
+      return straight_cosine<float>(setup_surface<float>(scene, hit, at.dir, false, false, lane),
+                                    at.dir);
+    };
+    const auto straight = straight_transmission<float>(scene, hit, material, cosine, true);
     return stops(scene, 1.f - straight.probability, at, keys);
   }
   if ((flags & kPresence) == 0) return true;

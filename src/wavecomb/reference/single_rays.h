@@ -43,7 +43,6 @@ class SingleRays {
     keys_.ray_kind = ray_kind(depth, false);
     keys_.bounce_pdf = bounce_pdf;
     keys_.shadow_set = nullptr;
-    keys_.optical_depth = nullptr;
     context_.accel->intersect(span(o, d, tfar), {&h.t, &h.u, &h.v, &h.prim, &h.geom, &h.inst}, 1,
                               false, keys_);
     counts_.add_rays(depth, 1);

@@ -213,15 +213,25 @@ double merging_gain(const TransportGain& merged, const TransportGain& unmerged) 
            merged.with.of_most));
 }
 
+namespace {
+
+/// Returns whether `is_low(roughness, varies)` for a lobe of the base or the clearcoat of `m`, or
+/// whether a graph drives the material.
+template <typename IsLow>
+bool may_have_lobe(const Material& m, const IsLow& is_low) {
+  const bool coats = m.clearcoat > 0 || m.has_texture(Input::kClearcoat);
+  return has_trait(m.program, program_trait::kGlossy) &&
+         (m.graph != kNoGraph || is_low(m.roughness, m.has_texture(Input::kRoughness)) ||
+          (coats && is_low(m.clearcoat_roughness, m.has_texture(Input::kClearcoatRoughness))));
+}
+
+}  // namespace
+
 bool focuses_light(const Scene& scene) {
-  return std::any_of(scene.materials().begin(), scene.materials().end(), [](const Material& m) {
-    const bool varies = m.graph != kNoGraph;
-    if (has_trait(m.program, program_trait::kGlass)) return true;
-    if (!has_trait(m.program, program_trait::kGlossy)) return false;
-    const bool passes = m.openpbr.transmission_weight > 0;
-    const bool coats = m.clearcoat > 0 || m.has_texture(Input::kClearcoat);
-    return varies || passes || is_sharp(m.roughness, m.has_texture(Input::kRoughness)) ||
-           (coats && is_sharp(m.clearcoat_roughness, m.has_texture(Input::kClearcoatRoughness)));
+  return std::ranges::any_of(scene.materials(), [](const Material& m) {
+    const bool transmits =
+        has_trait(m.program, program_trait::kGlossy) && m.openpbr.transmission_weight > 0;
+    return has_trait(m.program, program_trait::kGlass) || transmits || may_have_lobe(m, is_sharp);
   });
 }
 
@@ -230,15 +240,11 @@ namespace {
 /// Returns whether the camera may see caustics in a mirror or through glass, where camera paths
 /// have only delta bounces.
 bool shows_caustics(const Scene& scene) {
-  return std::any_of(scene.materials().begin(), scene.materials().end(), [](const Material& m) {
-    const auto smooth = [](float roughness, bool varies) {
-      return varies || alpha_from_roughness(roughness) < kDeltaAlpha;
-    };
-    if (!has_trait(m.program, program_trait::kGlossy)) return false;
-    return m.graph != kNoGraph || smooth(m.roughness, m.has_texture(Input::kRoughness)) ||
-           ((m.clearcoat > 0 || m.has_texture(Input::kClearcoat)) &&
-            smooth(m.clearcoat_roughness, m.has_texture(Input::kClearcoatRoughness)));
-  });
+  const auto is_smooth = [](float roughness, bool varies) {
+    return varies || alpha_from_roughness(roughness) < kDeltaAlpha;
+  };
+  return std::ranges::any_of(scene.materials(),
+                             [&](const Material& m) { return may_have_lobe(m, is_smooth); });
 }
 
 /// Renders the pilots with `small` for the candidate ratios from number `first` on. `unit` is the

@@ -15,8 +15,9 @@
 ///   (e_camera + e_left) c / (e_s c_s).
 /// Caustics that the camera sees in mirrors or through glass are found by merging only
 /// (light_paths/merge_grid.h). In scenes with such surfaces, pilots with merging at the larger
-/// ratio follow. Without merging, the pilots do not show the squared error of these caustics, so it
-/// is the difference of the squared errors without light paths, p_merged - p, and merging gains
+/// ratio follow. The squared error of these caustics without merging is estimated as p_merged - p:
+/// p is the squared error without light paths as estimated above, and p_merged the same from the
+/// pilots with merging. The gain of merging is
 ///   (e_s c_s + max(p_merged - p, 0) c_s) / (e_merged c_merged).
 /// Merging blurs caustics by up to a pixel, and is used only for a large gain.
 /// The choice does not depend on seed, region, threads, waves or lanes, so that crops, resumed

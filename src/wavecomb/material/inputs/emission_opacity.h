@@ -49,6 +49,22 @@ inline Color<F> fetch_emission(const MaterialView& view, const UInt<F>& material
   return fetch_emission<F>(view, material, uv, footprint, detail::UvOnly<F>{uv, footprint}, active);
 }
 
+namespace detail {
+
+/// Returns the opacity that `inputs` and the material's graph give.
+template <typename F, typename MakePoint>
+inline F read_opacity(const InputReader<F>& inputs, const MakePoint& make_point) {
+  const F opacity =
+      saturate(inputs.value(Input::kOpacity, inputs.record[&MaterialRecord::opacity]));
+  const UInt<F> graph = inputs.record[&MaterialRecord::opacity_graph];
+  const Mask<F> driven = inputs.active & Mask<F>(graph != UInt<F>(kNoGraph));
+  if (none(driven)) return opacity;
+  const Vec3<F> plain(opacity);
+  return graph_value<F>(inputs.view, graph, kOpacityOutput, make_point(driven), driven, plain).x;
+}
+
+}  // namespace detail
+
 /// Returns the opacity of the material at `uv`, from 0 to 1, regardless of its meaning.
 /// `make_point(active)` returns the inputs of the graph, and is called only if there is a graph.
 template <typename F, typename MakePoint>
@@ -56,13 +72,7 @@ inline F material_opacity(const MaterialView& view, const UInt<F>& material, con
                           const Footprint<F>& footprint, const MakePoint& make_point,
                           const Mask<F>& active) {
   const detail::InputReader<F> inputs(view, material, uv, footprint, active);
-  const F opacity =
-      detail::saturate(inputs.value(Input::kOpacity, inputs.record[&MaterialRecord::opacity]));
-  const UInt<F> graph = inputs.record[&MaterialRecord::opacity_graph];
-  const Mask<F> driven = active & Mask<F>(graph != UInt<F>(kNoGraph));
-  if (none(driven)) return opacity;
-  return graph_value<F>(view, graph, kOpacityOutput, make_point(driven), driven, Vec3<F>(opacity))
-      .x;
+  return detail::read_opacity<F>(inputs, make_point);
 }
 
 /// Returns the presence of the surface at `uv`, the probability that a ray hits it. With an opacity
@@ -74,7 +84,7 @@ inline F fetch_opacity(const MaterialView& view, const UInt<F>& material, const 
                        const Footprint<F>& footprint, const MakePoint& make_point,
                        const Mask<F>& active) {
   const detail::InputReader<F> inputs(view, material, uv, footprint, active);
-  const F opacity = material_opacity<F>(view, material, uv, footprint, make_point, active);
+  const F opacity = detail::read_opacity<F>(inputs, make_point);
   const F threshold = inputs.record[&MaterialRecord::opacity_threshold];
   const F cut = select(opacity < threshold, F(0.f), F(1.f));
   const F present = select(threshold > 0.f, cut, opacity);

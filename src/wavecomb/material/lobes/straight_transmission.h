@@ -35,14 +35,20 @@ inline Mask<F> transmits_straight(const UInt<F>& flags) {
   return Mask<F>((flags & UInt<F>(uint32_t{kTransmitsStraight})) != UInt<F>(0u));
 }
 
-/// Returns the straight transmission at a hit of a ray along `dir`. The active lanes must have
-/// materials with the flag kTransmitsStraight. The result is the same for the opposite direction.
+/// Returns the cosine on which straight transmission along `dir` depends. It is the same for the
+/// opposite direction.
 template <typename F>
-[[gnu::noinline, gnu::cold]] StraightTransmission<F> straight_transmission(const SceneView& scene,
-                                                                           const MeshHit<F>& hit,
-                                                                           const UInt<F>& material,
-                                                                           const Vec3<F>& dir,
-                                                                           const Mask<F>& active) {
+inline F straight_cosine(const Surface<F>& s, const Vec3<F>& dir) {
+  return min(abs(dot(dir, s.unadjusted)), F(1.f));
+}
+
+/// Returns the straight transmission at a hit. `make_cosine(lanes)` returns straight_cosine() and
+/// is called only if a lane has an opacity below 1. The active lanes must have materials with the
+/// flag kTransmitsStraight.
+template <typename F, typename MakeCosine>
+[[gnu::noinline, gnu::cold]] StraightTransmission<F> straight_transmission(
+    const SceneView& scene, const MeshHit<F>& hit, const UInt<F>& material,
+    const MakeCosine& make_cosine, const Mask<F>& active) {
   const MeshPosition<F> position{hit.mesh, hit.prim, hit.u, hit.v};
   const Vec2<F> uv = hit_uv<F>(scene.meshes, hit.mesh, hit.prim, hit.u, hit.v, active);
   const auto point = [&](const Mask<F>& lanes) {
@@ -52,13 +58,12 @@ template <typename F>
   const F opacity = material_opacity<F>(scene.materials, material, uv, finest, point, active);
   const Mask<F> passing = active & (opacity < 1.f);
   if (none(passing)) return {F(0.f), opacity};
-  const Surface<F> s = setup_surface<F>(scene, hit, dir, false, false, passing);
   ShadingParams<F> params =
       fetch_params<kPrincipledInputs, F>(scene.materials, material, uv, finest, point, passing);
   params.opacity = opacity;
   const PrincipledLayers<F, kMetalPart | kCoatPart | kTransmissionPart> layers(params, false);
-  const F z = min(abs(dot(dir, s.unadjusted)), F(1.f));
-  return {select(passing, layers.passing_probability(layers.straight(z)), F(0.f)), opacity};
+  const Color<F> straight = layers.straight(make_cosine(passing));
+  return {select(passing, layers.passing_probability(straight), F(0.f)), opacity};
 }
 
 }  // namespace wavecomb

@@ -48,8 +48,7 @@ RayRecording::RayRecording(std::shared_ptr<const Scene> scene, uint64_t byte_lim
   if (scene_->view().has_presence)
     throw Error(
         "the scene has surfaces of opacity below 1, which Embree alone would take for opaque; "
-        "record "
-        "the rays of a stage without them");
+        "record the rays of a stage without them");
 }
 
 RayRecording::~RayRecording() = default;
