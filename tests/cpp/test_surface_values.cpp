@@ -6,6 +6,7 @@
 #include "wavecomb/geometry/hit/surface.h"
 #include "wavecomb/material/inputs/graph_inputs.h"
 #include "wavecomb/material/inputs/presence.h"
+#include "wavecomb/material/lobes/straight_transmission.h"
 
 namespace wavecomb {
 namespace {
@@ -13,9 +14,9 @@ namespace {
 using namespace curve_testing;
 using lane_testing::same_bits;
 
-/// Meshes with texture coordinates per vertex, per corner and without, and curves of all kinds with
-/// and without them; untransformed, rotated and mirrored instances; materials of faces, meshes and
-/// instances.
+/// Meshes with texture coordinates and normals per vertex, per corner and without, and curves of all
+/// kinds with and without texture coordinates; untransformed, rotated and mirrored instances;
+/// materials of faces, meshes and instances.
 std::shared_ptr<const Scene> all_kinds() {
   SceneBuilder b;
   std::mt19937 rng(2);
@@ -30,6 +31,9 @@ std::shared_ptr<const Scene> all_kinds() {
       data.uvs_at = at;
       data.uvs.resize(at == Attribute::kNone ? 0 : (at == Attribute::kVertex ? 8 : 12));
       for (float& x : data.uvs) x = 3 * uniform(rng);
+      data.normals_at = at;
+      data.normals.resize(at == Attribute::kNone ? 0 : (at == Attribute::kVertex ? 12 : 18));
+      for (float& x : data.normals) x = uniform(rng);
       if (by_face) data.face_materials = {3, kInheritMaterial};
       add(make_mesh(std::move(data), at == Attribute::kVertex ? 2 : kInheritMaterial));
     }
@@ -173,6 +177,101 @@ TEST(SurfaceValues, PointsAtRestAreThoseOfShading) {
         const auto one = values_of<float>(rest_of<float>(view, hits.at<float>(i + k)));
         for (size_t c = 0; c < one.size(); ++c)
           ASSERT_TRUE(same_bits(one[c], lane(wide[c], k))) << "value " << c;
+      }
+    }
+  });
+}
+
+TEST(SurfaceValues, CosinesAreThoseOfShading) {
+  const auto scene = all_kinds();
+  const Hits hits(*scene);
+  const SceneView view = scene->view();
+  const Vec3<float> dir = normalize(Vec3<float>(0.3f, -0.5f, -1.f));
+  for (size_t i = 0; i < Hits::kCount; ++i) {
+    const MeshHit<float> hit = hits.at<float>(i);
+    const Surface<float> s = setup_surface<float>(view, hit, dir, false, false, true);
+    ASSERT_NEAR(unadjusted_cosine<float>(view, hit, dir, true), straight_cosine<float>(s, dir),
+                2e-6f)
+        << "mesh " << hit.mesh;
+  }
+}
+
+TEST(SurfaceValues, DegenerateTrianglesFaceTheRay) {
+  SceneBuilder b;
+  b.add_material(make_material(ProgramId::kDiffuse, Vec3<float>(0.5f)));
+  const uint32_t group = b.add_group("all");
+  b.add_to_group(group, b.add_mesh(make_mesh(quad({0, 0, 0}, {1, 0, 0}, {2, 0, 0}), 0)));
+  b.add_instance(0, group, translate(0, 0, 0), 0);
+  b.set_camera(make_camera({0, 0, 5}, {0, 0, 0}));
+  const auto scene = b.build();
+  const Vec3<float> dir(0, 0, -1);
+  EXPECT_FLOAT_EQ(unadjusted_cosine<float>(scene->view(), {1, 0, 0, 0.2f, 0.3f}, dir, true), 1.f);
+}
+
+/// Materials with straight transmission. The last two have no table.
+std::vector<Material> clear_materials() {
+  std::vector<Material> all;
+  for (const float roughness : {0.f, 0.2f, 0.9f})
+    for (const float coat : {0.f, 0.7f})
+      for (const float metallic : {0.f, 0.4f}) {
+        Material m = make_material(ProgramId::kPrincipled, {0.9f, 0.5f, 0.3f});
+        m.roughness = roughness;
+        m.clearcoat = coat;
+        m.metallic = metallic;
+        m.opacity = 0.1f * static_cast<float>(all.size() % 7);
+        m.ior = 1.2f + 0.1f * static_cast<float>(all.size());
+        if (all.size() % 4 == 3) m.emission = {1, 1, 1};
+        all.push_back(m);
+      }
+  for (const bool opaque : {true, false}) {
+    Material m = make_material(ProgramId::kPrincipled, {0.9f, 0.5f, 0.3f});
+    m.opacity = opaque ? 1.f : 0.2f;
+    m.textures[static_cast<size_t>(opaque ? Input::kOpacity : Input::kRoughness)] = use(0, 0);
+    all.push_back(m);
+  }
+  return all;
+}
+
+TEST(SurfaceValues, TablesOfStraightTransmissionAreThoseOfTheLayers) {
+  SceneBuilder b;
+  add_texture(b, 2, 2, 1, {0.2f, 0.3f, 0.4f, 0.8f});
+  const std::vector<Material> materials = clear_materials();
+  for (const Material& m : materials) b.add_material(m);
+  b.add_to_group(0, b.add_mesh(make_mesh(quad({0, 0, 0}, {1, 0, 0}, {0, 1, 0}), 0)));
+  b.set_camera(make_camera({0, 0, 5}, {0, 0, 0}));
+  const auto scene = b.build();
+  const SceneView view = scene->view();
+  const MeshHit<float> hit{0, 0, 0, 0.2f, 0.3f};
+  for (uint32_t m = 0; m < materials.size(); ++m) {
+    const bool constant = m + 2 < materials.size();
+    ASSERT_EQ(view.materials.straight_table[m] != kNoStraightTable, constant) << m;
+    for (uint32_t i = 0; i <= 1000; ++i) {
+      const float z = static_cast<float>(i) / 1000;
+      const auto cosine = [&](auto /*lanes*/) { return z; };
+      const auto exact = detail::evaluate_straight<float>(view, hit, m, cosine, true);
+      const auto found = straight_transmission<float>(view, hit, m, cosine, true);
+      ASSERT_NEAR(found.probability, exact.probability, 3e-4f) << m << " " << z;
+      ASSERT_TRUE(same_bits(found.opacity, exact.opacity)) << m;
+    }
+  }
+  lane_testing::for_each_packet([&]<typename F>() {
+    using U = UInt<F>;
+    for (uint32_t i = 0; i < 200; ++i) {
+      alignas(64) uint32_t material[kWidth<F>];
+      alignas(64) float z[kWidth<F>];
+      for (size_t k = 0; k < kWidth<F>; ++k) {
+        material[k] = static_cast<uint32_t>((i + 3 * k) % materials.size());
+        z[k] = static_cast<float>((i * 37 + k * 11) % 200) / 199.f;
+      }
+      const MeshHit<F> wide_hit{U(0u), U(0u), U(0u), F(0.2f), F(0.3f)};
+      const auto cosine = [&](const auto& /*lanes*/) { return load<F>(z); };
+      const auto wide = straight_transmission<F>(view, wide_hit, load<U>(material), cosine,
+                                                 Mask<F>(true));
+      for (size_t k = 0; k < kWidth<F>; ++k) {
+        const auto one_cosine = [&](auto /*lanes*/) { return z[k]; };
+        const auto one = straight_transmission<float>(view, hit, material[k], one_cosine, true);
+        ASSERT_TRUE(same_bits(one.probability, lane(wide.probability, k)));
+        ASSERT_TRUE(same_bits(one.opacity, lane(wide.opacity, k)));
       }
     }
   });

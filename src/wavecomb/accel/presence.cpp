@@ -136,8 +136,7 @@ bool is_present(const SceneView& scene, const PresenceQuery& at, const PresenceK
   if (keys.passes_straight && (flags & kTransmitsStraight) != 0) {
     const MeshHit<float> hit{at.instance, at.mesh, at.prim, at.u, at.v, at.time};
     const auto cosine = [&](bool lane) {
-      return straight_cosine<float>(setup_surface<float>(scene, hit, at.dir, false, false, lane),
-                                    at.dir);
+      return unadjusted_cosine<float>(scene, hit, at.dir, lane);
     };
     const auto straight = straight_transmission<float>(scene, hit, material, cosine, true);
     return stops(scene, 1.f - straight.probability, at, keys);

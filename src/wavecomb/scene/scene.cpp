@@ -83,6 +83,10 @@ Scene::Scene(std::shared_ptr<const SceneGeometry> geometry,
   v.materials.textures = geometry_->texture_views.data();
   v.materials.openpbr = materials_->openpbr.data();
   v.materials.own = materials_->own.data();
+  if (!materials_->straight_table.empty()) {
+    v.materials.straight_table = materials_->straight_table.data();
+    v.materials.straight_tables = materials_->straight_tables.data();
+  }
   v.materials.graphs = materials_->graphs->view();
   v.materials.graphs.attributes = geometry_->attributes();
   v.lights = lights_->set.view(v.materials);

@@ -144,6 +144,10 @@ struct SceneMaterials {
   std::vector<OpenPbrRecord> openpbr;  ///< records of materials of the program openpbr
   /// Program-specific parameters by material; empty if no material's program has any.
   std::vector<ProgramParameterRecord> own;
+  /// Tables of straight transmission, and the index of each material's table or kNoStraightTable;
+  /// empty if no material has a table (MaterialView).
+  std::vector<uint32_t> straight_table;
+  std::vector<float> straight_tables;
   /// Subsurface media by material; empty if there are no subsurface random walks.
   std::vector<SubsurfaceMedium<float>> walks;
   /// Media inside meshes by material; empty if paths need no medium stack.

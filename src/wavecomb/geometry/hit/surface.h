@@ -17,7 +17,6 @@ namespace detail {
 /// Hit point on a triangle in object space.
 template <typename F>
 struct TrianglePoint {
-  UInt<F> corner;              ///< index of the triangle's first corner
   std::array<UInt<F>, 3> i;    ///< vertices
   Vec3<F> p0, p1, p2, e1, e2;  ///< positions of the vertices, and edges from the first vertex
   Vec3<F> p;                   ///< hit point
@@ -47,6 +46,44 @@ struct SmoothLanes {
   bool with_terminator;
 };
 
+/// Normals of a triangle's corners in object space.
+template <typename F>
+struct CornerNormals {
+  Vec3<F> n0, n1, n2;
+
+  /// Reads the normals of vertices or corners; `corners` are the indices of the vertices.
+  template <bool kWithMotion>
+  static WAVECOMB_INLINE CornerNormals read(const SceneView& scene, const MeshHit<F>& hit,
+                                            const MeshReader<F>& mesh,
+                                            const std::array<UInt<F>, 3>& corners,
+                                            const Mask<F>& smooth) {
+    using U = UInt<F>;
+    const Mask<U> selected(Mask<F>((mesh.flags & kNormalsPerCorner) != U(0u)));
+    const U corner = hit.prim * 3u;
+    const U a0 = select(selected, corner, corners[0]),
+            a1 = select(selected, U(corner + 1u), corners[1]),
+            a2 = select(selected, U(corner + 2u), corners[2]);
+    if (kWithMotion && scene.has_motion) [[unlikely]] {
+      const auto moved = moved_normals<F>(scene, hit.mesh, {a0, a1, a2}, hit.time, smooth);
+      return {moved[0], moved[1], moved[2]};
+    }
+    return {mesh.vec3(&MeshRecord::normals, a0, smooth),
+            mesh.vec3(&MeshRecord::normals, a1, smooth),
+            mesh.vec3(&MeshRecord::normals, a2, smooth)};
+  }
+
+  /// Returns the interpolated normal in world space, of any length.
+  Vec3<F> at(const InstanceMaps<F>& maps, const F& b0, const F& b1, const F& b2) const {
+    return maps.map_normal(fma(n2, b2, fma(n1, b1, Vec3<F>(n0 * b0))));
+  }
+};
+
+/// Returns the lanes whose meshes have normals to interpolate.
+template <typename F>
+inline Mask<F> has_normals(const MeshReader<F>& mesh) {
+  return Mask<F>((mesh.flags & (kNormalsPerVertex | kNormalsPerCorner)) != UInt<F>(0u));
+}
+
 /// Sets the shading normal ns from the normals of vertices or corners, and sets the terminator
 /// vector.
 template <bool kWithMotion, typename F>
@@ -54,23 +91,10 @@ WAVECOMB_INLINE void set_smooth_normal(const SceneView& scene, const MeshHit<F>&
                                        const MeshReader<F>& mesh, const InstanceMaps<F>& maps,
                                        const TrianglePoint<F>& at, const SmoothLanes<F>& lanes,
                                        Surface<F>& s) {
-  using U = UInt<F>;
   const auto& [smooth, with_terminator] = lanes;
-  const Mask<F> per_corner = Mask<F>((mesh.flags & kNormalsPerCorner) != U(0u));
-  const Mask<U> selected(per_corner);
-  const U a0 = select(selected, U(at.corner), at.i[0]),
-          a1 = select(selected, U(at.corner + 1u), at.i[1]),
-          a2 = select(selected, U(at.corner + 2u), at.i[2]);
-  Vec3<F> n0 = mesh.vec3(&MeshRecord::normals, a0, smooth);
-  Vec3<F> n1 = mesh.vec3(&MeshRecord::normals, a1, smooth);
-  Vec3<F> n2 = mesh.vec3(&MeshRecord::normals, a2, smooth);
-  if (kWithMotion && scene.has_motion) [[unlikely]] {
-    const auto moved = moved_normals<F>(scene, hit.mesh, {a0, a1, a2}, hit.time, smooth);
-    n0 = moved[0];
-    n1 = moved[1];
-    n2 = moved[2];
-  }
-  const Vec3<F> n = maps.map_normal(fma(n2, at.b2, fma(n1, at.b1, Vec3<F>(n0 * at.b0))));
+  const auto normals = CornerNormals<F>::template read<kWithMotion>(scene, hit, mesh, at.i, smooth);
+  const auto& [n0, n1, n2] = normals;
+  const Vec3<F> n = normals.at(maps, at.b0, at.b1, at.b2);
   const F len2 = length_squared(n);
   const Mask<F> valid = smooth & (len2 > 0.f) & is_finite(len2);
   Vec3<F> ns = n * F(1.f / sqrt(select(valid, len2, F(1.f))));
@@ -130,13 +154,11 @@ template <typename F, bool kWithCurves = true, bool kWithMotion = true>
 WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F>& hit,
                                          const Vec3<F>& dir, bool with_uv, bool with_terminator,
                                          const Mask<F>& lanes) {
-  using U = UInt<F>;
   Mask<F> active = lanes;
   if (kWithCurves && scene.has_curves)
     active = active & not_(detail::is_curved<F>(scene, hit.mesh, lanes));
   const detail::MeshReader<F> mesh(scene.meshes, hit.mesh, active);
   detail::InstanceMaps<F> maps(scene.instances, hit.inst, active);
-  const U corner = hit.prim * 3u;
   const auto [i0, i1, i2] = mesh.corners(hit.prim, active);
   Vec3<F> p0 = mesh.vec3(&MeshRecord::positions, i0, active);
   Vec3<F> p1 = mesh.vec3(&MeshRecord::positions, i1, active);
@@ -163,8 +185,7 @@ WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F
   const F safe_area2 = select(area2 > 0.f, area2, F(1.f));
   s.ng = select<F>(area2 > 0.f, area_vector * F(1.f / safe_area2), -dir);
 
-  const detail::TrianglePoint<F> at{.corner = corner,
-                                    .i = {i0, i1, i2},
+  const detail::TrianglePoint<F> at{.i = {i0, i1, i2},
                                     .p0 = p0,
                                     .p1 = p1,
                                     .p2 = p2,
@@ -183,8 +204,7 @@ WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F
 
   s.ns = s.ng;
   s.terminator = Vec3<F>(F(0.f));
-  const Mask<F> smooth =
-      Mask<F>((mesh.flags & (kNormalsPerVertex | kNormalsPerCorner)) != U(0u)) & active;
+  const Mask<F> smooth = detail::has_normals(mesh) & active;
   if (any(smooth))
     detail::set_smooth_normal<kWithMotion, F>(scene, hit, mesh, maps, at, {smooth, with_terminator},
                                               s);
@@ -200,6 +220,40 @@ WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F
   s.unadjusted = s.ns;
   s.ns = facing_normal<F>(dir, s.ng, s.ns);
   return s;
+}
+
+/// Returns |cos| of the angle between `dir` and Surface::unadjusted of the shading point that
+/// setup_surface() computes, but reads no more of the mesh than this needs.
+template <typename F>
+inline F unadjusted_cosine(const SceneView& scene, const MeshHit<F>& hit, const Vec3<F>& dir,
+                           const Mask<F>& lanes) {
+  const auto cosine = [&](const Vec3<F>& n) { return min(abs(dot(dir, n)), F(1.f)); };
+  if (scene.has_motion || (scene.has_curves && any(detail::is_curved<F>(scene, hit.mesh, lanes))))
+    return cosine(setup_surface<F>(scene, hit, dir, false, false, lanes).unadjusted);
+  const detail::MeshReader<F> mesh(scene.meshes, hit.mesh, lanes);
+  const detail::InstanceMaps<F> maps(scene.instances, hit.inst, lanes);
+  const auto corners = mesh.corners(hit.prim, lanes);
+  Vec3<F> n(F(0.f));
+  const Mask<F> smooth = detail::has_normals(mesh) & lanes;
+  if (any(smooth)) {
+    const auto normals =
+        detail::CornerNormals<F>::template read<false>(scene, hit, mesh, corners, smooth);
+    n = normals.at(maps, F(F(1.f - hit.u) - hit.v), hit.u, hit.v);
+  }
+  F len2 = length_squared(n);
+  const Mask<F> flat = lanes & not_(smooth & (len2 > 0.f) & is_finite(len2));
+  if (any(flat)) {
+    const auto corner = [&](size_t k) {
+      return mesh.vec3(&MeshRecord::positions, corners[k], flat);
+    };
+    const Vec3<F> p0 = corner(0), area = maps.map_normal(cross(corner(1) - p0, corner(2) - p0));
+    n = select<F>(flat, area, n);
+    len2 = length_squared(n);
+    // Like setup_surface(), take degenerate triangles to face the ray.
+    n = select<F>(len2 > 0.f, n, dir);
+    len2 = select(len2 > 0.f, len2, F(1.f));
+  }
+  return cosine(n * F(1.f / sqrt(len2)));
 }
 
 /// Returns the origin of a ray that leaves `s` along `dir`, offset from the surface on that side,

@@ -149,6 +149,9 @@ struct alignas(16) ProgramParameterRecord {
 };
 static_assert(sizeof(ProgramParameterRecord) == 4 * kMaxProgramParameters);
 
+/// Entry of MaterialView::straight_table for a material without a table.
+inline constexpr uint32_t kNoStraightTable = 0xffffffffu;
+
 /// Device view of all materials. Texture uses are indexed by `material * kInputCount + input`.
 struct MaterialView {
   const MaterialRecord* materials = nullptr;
@@ -158,6 +161,10 @@ struct MaterialView {
   /// Records of program-specific parameters, indexed by material; null if no material has any.
   const ProgramParameterRecord* own = nullptr;
   const float* energy = nullptr;  ///< energy tables (EnergyTables), if a material needs them
+  /// By material, the index of its table in `straight_tables`, or kNoStraightTable; null if no
+  /// material has a table (lobes/straight_transmission.h).
+  const uint32_t* straight_table = nullptr;
+  const float* straight_tables = nullptr;
   GraphView graphs{};
 };
 

@@ -7,6 +7,7 @@
 #include "wavecomb/graph/parameters/parameters.h"
 #include "wavecomb/material/description/simplified_material.h"
 #include "wavecomb/material/description/variants.h"
+#include "wavecomb/material/lobes/straight_transmission.h"
 #include "wavecomb/scene/scene_parts.h"
 
 namespace wavecomb {
@@ -106,6 +107,29 @@ TextureUseRecord make_use_record(const TextureUse& use) {
   return r;
 }
 
+/// Returns whether straight transmission depends on nothing but the cosine.
+bool has_straight_table(const Material& m) {
+  if (!m.transmits_straight() || m.graph != kNoGraph || m.opacity_graph != kNoGraph) return false;
+  for (uint32_t s = 0; s < kInputCount; ++s)
+    if ((kStraightInputs >> s & 1u) != 0 && m.has_texture(static_cast<Input>(s))) return false;
+  return true;
+}
+
+/// Tabulates the straight transmission of materials with constant inputs.
+void add_straight_tables(SceneMaterials& all) {
+  const auto found = std::ranges::count_if(all.shaded, has_straight_table);
+  if (found == 0) return;
+  all.straight_table.assign(all.shaded.size(), kNoStraightTable);
+  all.straight_tables.reserve(static_cast<size_t>(found) * kStraightNodes);
+  MaterialView view;
+  view.materials = all.records.data();
+  for (uint32_t m = 0; m < all.shaded.size(); ++m) {
+    if (!has_straight_table(all.shaded[m])) continue;
+    all.straight_table[m] = static_cast<uint32_t>(all.straight_tables.size() / kStraightNodes);
+    append_straight_table(view, m, all.straight_tables);
+  }
+}
+
 }  // namespace
 
 SceneMaterials::SceneMaterials(std::vector<Material> all, std::shared_ptr<const GraphSet> programs_,
@@ -141,6 +165,7 @@ SceneMaterials::SceneMaterials(std::vector<Material> all, std::shared_ptr<const 
     has_emission = has_emission || m.emits();
     has_absorbing_graphs = has_absorbing_graphs || absorbs_by_graph(m, *graphs);
   }
+  add_straight_tables(*this);
   if (event_material != kInheritMaterial) nested_media = make_mesh_media(shaded, *graphs, true);
 }
 

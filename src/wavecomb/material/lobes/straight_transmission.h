@@ -12,8 +12,11 @@
 /// light samples reach lights behind clear surfaces.
 ///
 /// The probability depends on the shading normal without normal map, and on inputs at the finest
-/// texture level, so that traversal and shading compute the same value.
+/// texture level, so that traversal and shading compute the same value. If all inputs are constant,
+/// both look it up in a table over the cosine, since traversal calls it for each hit.
 #pragma once
+
+#include <vector>
 
 #include "wavecomb/geometry/hit/surface.h"
 #include "wavecomb/material/inputs/presence.h"
@@ -29,6 +32,49 @@ struct StraightTransmission {
   F opacity;      ///< opacity at the finest texture level
 };
 
+/// Inputs on which straight transmission depends.
+inline constexpr uint32_t kStraightInputs = kPrincipledInputs & ~input_bit(Input::kNormal);
+
+/// Number of nodes of a table of straight transmission. The nodes are uniform in sqrt(cosine), and
+/// linear interpolation errs by at most 3e-4.
+inline constexpr uint32_t kStraightNodes = 129;
+
+namespace detail {
+
+/// Layers that determine straight transmission.
+template <typename F>
+using StraightLayers = PrincipledLayers<F, kMetalPart | kCoatPart | kTransmissionPart>;
+
+/// Returns the probability with which rays pass `layers` at cosine z.
+template <typename F>
+inline F passing_at(const StraightLayers<F>& layers, const F& z) {
+  return layers.passing_probability(layers.straight(z));
+}
+
+/// Looks up the probability with which rays pass at cosine `z` in table `index`.
+template <typename F>
+inline F tabulated_passing(const float* tables, const UInt<F>& index, const F& z,
+                           const Mask<F>& active) {
+  const F x = sqrt(z) * static_cast<float>(kStraightNodes - 1);
+  const F below = min(floor(x), F(static_cast<float>(kStraightNodes - 2)));
+  const UInt<F> at = index * kStraightNodes + UInt<F>(to_int<F>(below));
+  const F a = gather<F>(tables, at, active), b = gather<F>(tables, at + 1u, active);
+  return fma(F(b - a), F(x - below), a);
+}
+
+}  // namespace detail
+
+/// Appends the table of a material whose inputs are constant to `tables`.
+inline void append_straight_table(const MaterialView& view, uint32_t material,
+                                  std::vector<float>& tables) {
+  const auto params = fetch_params<0, float>(view, material, {0, 0}, Footprint<float>(0.f), true);
+  const detail::StraightLayers<float> layers(params, false);
+  for (uint32_t i = 0; i < kStraightNodes; ++i) {
+    const float x = static_cast<float>(i) / (kStraightNodes - 1);
+    tables.push_back(detail::passing_at<float>(layers, x * x));
+  }
+}
+
 /// Returns the lanes whose materials may transmit light straight.
 template <typename F>
 inline Mask<F> transmits_straight(const UInt<F>& flags) {
@@ -42,11 +88,11 @@ inline F straight_cosine(const Surface<F>& s, const Vec3<F>& dir) {
   return min(abs(dot(dir, s.unadjusted)), F(1.f));
 }
 
-/// Returns the straight transmission at a hit. `make_cosine(lanes)` returns straight_cosine() and
-/// is called only if a lane has an opacity below 1. The active lanes must have materials with the
-/// flag kTransmitsStraight.
+namespace detail {
+
+/// Evaluates straight_transmission() for materials without a table.
 template <typename F, typename MakeCosine>
-[[gnu::noinline, gnu::cold]] StraightTransmission<F> straight_transmission(
+[[gnu::noinline, gnu::cold]] StraightTransmission<F> evaluate_straight(
     const SceneView& scene, const MeshHit<F>& hit, const UInt<F>& material,
     const MakeCosine& make_cosine, const Mask<F>& active) {
   const MeshPosition<F> position{hit.mesh, hit.prim, hit.u, hit.v};
@@ -61,9 +107,36 @@ template <typename F, typename MakeCosine>
   ShadingParams<F> params =
       fetch_params<kPrincipledInputs, F>(scene.materials, material, uv, finest, point, passing);
   params.opacity = opacity;
-  const PrincipledLayers<F, kMetalPart | kCoatPart | kTransmissionPart> layers(params, false);
-  const Color<F> straight = layers.straight(make_cosine(passing));
-  return {select(passing, layers.passing_probability(straight), F(0.f)), opacity};
+  const StraightLayers<F> layers(params, false);
+  return {select(passing, passing_at<F>(layers, make_cosine(passing)), F(0.f)), opacity};
+}
+
+}  // namespace detail
+
+/// Returns the straight transmission at a hit. `make_cosine(lanes)` returns straight_cosine() and
+/// is called only if a lane has an opacity below 1. The active lanes must have materials with the
+/// flag kTransmitsStraight.
+template <typename F, typename MakeCosine>
+inline StraightTransmission<F> straight_transmission(const SceneView& scene, const MeshHit<F>& hit,
+                                                     const UInt<F>& material,
+                                                     const MakeCosine& make_cosine,
+                                                     const Mask<F>& active) {
+  using U = UInt<F>;
+  const MaterialView& materials = scene.materials;
+  if (!materials.straight_table)
+    return detail::evaluate_straight<F>(scene, hit, material, make_cosine, active);
+  const U table = gather<U>(materials.straight_table, material, Mask<U>(active));
+  const Mask<F> tabulated = active & Mask<F>(table != U(kNoStraightTable));
+  const Mask<F> others = active & not_(tabulated);
+  StraightTransmission<F> found{F(0.f), F(1.f)};
+  if (any(others)) found = detail::evaluate_straight<F>(scene, hit, material, make_cosine, others);
+  if (none(tabulated)) return found;
+  const F probability = detail::tabulated_passing<F>(materials.straight_tables, table,
+                                                     make_cosine(tabulated), tabulated);
+  const F opacity = detail::saturate(
+      gather_member<F>(materials.materials, &MaterialRecord::opacity, material, tabulated));
+  return {select(tabulated, probability, found.probability),
+          select(tabulated, opacity, found.opacity)};
 }
 
 }  // namespace wavecomb
