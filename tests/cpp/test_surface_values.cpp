@@ -14,7 +14,7 @@ namespace {
 using namespace curve_testing;
 using lane_testing::same_bits;
 
-/// Meshes with texture coordinates and normals per vertex, per corner and without, and curves of all
+/// Meshes with texture coordinates and normals per vertex, per corner and without; curves of all
 /// kinds with and without texture coordinates; untransformed, rotated and mirrored instances;
 /// materials of faces, meshes and instances.
 std::shared_ptr<const Scene> all_kinds() {
