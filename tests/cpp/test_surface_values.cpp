@@ -265,8 +265,8 @@ TEST(SurfaceValues, TablesOfStraightTransmissionAreThoseOfTheLayers) {
       }
       const MeshHit<F> wide_hit{U(0u), U(0u), U(0u), F(0.2f), F(0.3f)};
       const auto cosine = [&](const auto& /*lanes*/) { return load<F>(z); };
-      const auto wide = straight_transmission<F>(view, wide_hit, load<U>(material), cosine,
-                                                 Mask<F>(true));
+      const auto wide =
+          straight_transmission<F>(view, wide_hit, load<U>(material), cosine, Mask<F>(true));
       for (size_t k = 0; k < kWidth<F>; ++k) {
         const auto one_cosine = [&](auto /*lanes*/) { return z[k]; };
         const auto one = straight_transmission<float>(view, hit, material[k], one_cosine, true);

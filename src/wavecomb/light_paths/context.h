@@ -23,6 +23,14 @@ struct LightPathContext {
   LightPathContext(const Settings& settings, const LightSplatFilter& filter, float paths_per_sample,
                    const MergeGrid* grid);
 
+  /// Turns connections and merging off, for pilots whose film has no light splats. The weights of
+  /// camera paths still take account of light paths that reach the camera.
+  void disable_splats() {
+    grid = nullptr;
+    connects = false;
+    merge_scale = 0;
+  }
+
   /// Filter of light splats; null without light paths.
   const LightSplatFilter* filter = nullptr;
   /// Points with which light paths are merged; null without merging.

@@ -62,12 +62,12 @@ TriangleColumns::TriangleColumns(const Mesh& mesh)
     each_cell(t, [&](size_t k) { triangles_[next[k]++] = static_cast<uint32_t>(t); });
 }
 
-int TriangleColumns::faces_left(const Vec3<float>& point, size_t& tests) const {
+FacesLeft TriangleColumns::faces_left(const Vec3<float>& point, size_t& tests) const {
   const Vec3<float> p{point.x - kSlopeX * point.z, point.y - kSlopeY * point.z, point.z};
-  if (p.x < low_[0] || p.x > high_[0] || p.y < low_[1] || p.y > high_[1]) return 0;
+  if (p.x < low_[0] || p.x > high_[0] || p.y < low_[1] || p.y > high_[1]) return {};
   const size_t k =
       size_t{cell(p.y, low_[1], per_unit_[1])} * side_ + cell(p.x, low_[0], per_unit_[0]);
-  int left = 0;
+  FacesLeft left;
   for (uint32_t i = first_[k]; i < first_[k + 1]; ++i, ++tests) {
     const uint32_t* corner = &indices_[size_t{3} * triangles_[i]];
     const Vec3<float> a = vertex(corner[0]) - p, b = vertex(corner[1]) - p,
@@ -76,8 +76,10 @@ int TriangleColumns::faces_left(const Vec3<float>& point, size_t& tests) const {
     const float u = b.x * c.y - b.y * c.x, v = c.x * a.y - c.y * a.x, w = a.x * b.y - a.y * b.x;
     const float all = u + v + w;
     if (all == 0 || (u < 0) != (all < 0) || (v < 0) != (all < 0) || (w < 0) != (all < 0)) continue;
-    if ((u * a.z + v * b.z + w * c.z) / all <= 0) continue;
-    left += all > 0 ? 1 : -1;
+    const float distance = (u * a.z + v * b.z + w * c.z) / all;
+    const int side = all > 0 ? 1 : -1;
+    if (distance > 0) left.ahead += side;
+    if (distance < 0) left.behind -= side;
   }
   return left;
 }

@@ -12,6 +12,13 @@
 
 namespace wavecomb {
 
+/// Faces through which a line leaves a mesh minus the faces through which it enters: 1 inside a
+/// closed mesh that faces outwards, and 0 outside.
+struct FacesLeft {
+  int ahead = 0;   ///< on the half of the line ahead of the point
+  int behind = 0;  ///< on the other half, in the opposite direction
+};
+
 /// Triangles of a mesh in a 2D grid perpendicular to one direction. The direction is oblique to the
 /// axes, so that lines through the middle of a regular mesh do not hit its edges.
 class TriangleColumns {
@@ -19,10 +26,9 @@ class TriangleColumns {
   /// Builds the grid. `mesh` must outlive it.
   explicit TriangleColumns(const Mesh& mesh);
 
-  /// Returns the number of faces through which the line from `p` leaves the mesh minus the number
-  /// of faces through which it enters: 1 inside a closed mesh that faces outwards, 0 outside. Adds
+  /// Counts the faces through which a line through `p` leaves the mesh, in both directions. Adds
   /// the number of tested triangles to `tests`.
-  int faces_left(const Vec3<float>& p, size_t& tests) const;
+  FacesLeft faces_left(const Vec3<float>& p, size_t& tests) const;
 
  private:
   Vec3<float> vertex(uint32_t i) const;

@@ -253,11 +253,12 @@ class Search {
     if (!hollow) hollow = is_hollow(meshes_[mesh]);
     return *hollow;
   }
-  /// Returns whether a point is inside glass. The test follows a line from the point to infinity,
-  /// and compares the number of times that the line leaves glass and enters glass. Faces of the
-  /// mesh instance that contains the point are ignored.
+  /// Returns whether a point is inside glass. The test follows a line from the point to infinity in
+  /// both directions, and compares the number of times that the line leaves glass and enters glass.
+  /// An open surface, such as a single pane, has points behind it, but lies on one side of them
+  /// only. Faces of the mesh instance that contains the point are ignored.
   bool is_in_glass(const Point& p, uint32_t mesh, const Instance* instance) {
-    int left = 0;
+    FacesLeft left;
     glass_->any(grown({p, p}), tests_, [&](const Glass& g) {
       if (g.mesh == mesh && g.instance == instance) return false;
       std::optional<TriangleColumns>& columns = shape(g.mesh).columns;
@@ -265,10 +266,12 @@ class Search {
         columns.emplace(meshes_[g.mesh]);
         tests_ += meshes_[g.mesh].triangle_count();
       }
-      left += columns->faces_left(g.to_mesh.point(p), tests_);
+      const FacesLeft own = columns->faces_left(g.to_mesh.point(p), tests_);
+      left.ahead += own.ahead;
+      left.behind += own.behind;
       return false;
     });
-    return left > 0;
+    return left.ahead > 0 && left.behind > 0;
   }
   /// Returns whether a part of a mesh instance is inside the glass of another mesh instance.
   bool is_inside(uint32_t mesh, const Instance& instance) {

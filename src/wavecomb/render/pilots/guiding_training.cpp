@@ -134,6 +134,8 @@ class Trainer {
     if (is_auto() && is_timed()) max_s_ = double{settings_.time_limit} / kMaxTimeShare;
     context_.settings = &settings_;
     context_.film = &film_;
+    // The film of training has neither sums of light splats nor merge points.
+    context_.joint.disable_splats();
     context_.aovs = nullptr;
     context_.recorder = nullptr;
     context_.discards = true;
