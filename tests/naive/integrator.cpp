@@ -159,6 +159,12 @@ class Integrator {
                : kNoLight;
   }
 
+  /// Returns whether sampled_only() adds the light of the mesh that a ray hits.
+  bool is_counted_apart(const Hit& hit, const Ray& ray) const {
+    const uint32_t light = ray.is_seen ? kNoLight : mesh_light_of(hit);
+    return light != kNoLight && is_apart(scene_.lights.lights[light]);
+  }
+
   Rgb radiance(Ray ray, uint32_t depth, F tfar) {
     const Hit hit = closest(ray.o, ray.d, tfar, ray.is_seen && depth > 0);
     ray.cone_width = ray.cone_spread * hit.t + ray.cone_width;
@@ -247,7 +253,9 @@ class Integrator {
     Rgb out(0.f);
     if constexpr (Bsdf::kEmits) {
       out = at.params.emission;
-      if (scene_.mesh_lights)
+      if (is_counted_apart(hit, ray))
+        out = Rgb(0.f);
+      else if (scene_.mesh_lights)
         out =
             mesh_light_emission<F>(scene_, hit.inst, hit.geom, out, ray.state(), depth == 0, true);
     }
