@@ -163,6 +163,50 @@ TEST(Programs, TintedTransmissionIsSharedWithTraversal) {
   EXPECT_NEAR(passed.z, straight.z - straight.x, 1e-5f);
 }
 
+TEST(Programs, ThinWallsShareTransmissionWithTraversal) {
+  // Traversal and the BSDF of a stopped path together transmit as much as the wall, and other lobes
+  // do not change.
+  using Bsdf = OpenPbrBsdf<float, kAllParts>;
+  for (const float coat : {0.f, 0.6f})
+    for (const float fuzz : {0.f, 0.5f})
+      for (const float glass : {0.4f, 1.f})
+        for (const Vec& tint : {Vec(1, 1, 1), Vec(0.9f, 0.6f, 0.3f)})
+          for (const float z : {0.1f, 0.5f, 1.f}) {
+            auto p = plain_params();
+            p.roughness = p.clearcoat_roughness = 0;
+            p.thin_walled = 1;
+            p.transmission_weight = glass;
+            p.transmission_tint = tint;
+            p.clearcoat = coat;
+            p.coat_color = {0.9f, 0.8f, 0.9f};
+            p.fuzz_weight = fuzz;
+            const Bsdf whole(p, false);
+            const Vec wo = direction(z, 1);
+            const Vec passed = whole.straight(whole.view(wo));
+            const float passing = std::min({passed.x, passed.y, passed.z});
+            EXPECT_GT(passing, 0.f);
+            p.flags = kTransmitsStraight;
+            p.opacity = 1 - passing;
+            const Bsdf rest(p, false);
+            const auto sums = [&wo](const Bsdf& bsdf) {
+              std::pair<Vec, Vec> sum(Vec(0.f), Vec(0.f));  // straight; other
+              constexpr int kSamples = 20000;
+              for (uint32_t i = 0; i < kSamples; ++i) {
+                const auto [l, u, v] = kronecker(i);
+                const auto s = bsdf.sample(wo, l, u, v);
+                (s.is_delta && s.wi.z < 0 ? sum.first : sum.second) += s.weight * (1.f / kSamples);
+              }
+              return sum;
+            };
+            const auto [a, b] = sums(whole);
+            const auto [c, d] = sums(rest);
+            EXPECT_NEAR(c.x + passing, a.x, 0.02f * a.x) << coat << fuzz << glass << z;
+            EXPECT_NEAR(c.z + passing, a.z, 0.02f * a.z) << coat << fuzz << glass << z;
+            EXPECT_NEAR(d.x, b.x, 0.02f * b.x + 1e-3f) << coat << fuzz << glass << z;
+            EXPECT_NEAR(d.z, b.z, 0.02f * b.z + 1e-3f) << coat << fuzz << glass << z;
+          }
+}
+
 TEST(Programs, ReciprocityHolds) {
   // f(o, i) / n_o^2 = f(i, o) / n_i^2 (Veach 1997, eq. 5.14).
   std::mt19937 rng(11);

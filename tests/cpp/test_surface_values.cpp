@@ -6,6 +6,7 @@
 #include "wavecomb/geometry/hit/surface.h"
 #include "wavecomb/material/inputs/graph_inputs.h"
 #include "wavecomb/material/inputs/presence.h"
+#include "wavecomb/material/lobes/fresnel.h"
 #include "wavecomb/material/lobes/straight_transmission.h"
 
 namespace wavecomb {
@@ -275,6 +276,44 @@ TEST(SurfaceValues, TablesOfStraightTransmissionAreThoseOfTheLayers) {
       }
     }
   });
+}
+
+TEST(SurfaceValues, SmoothThinWallsHaveTables) {
+  SceneBuilder b;
+  add_texture(b, 2, 2, 1, {0.2f, 0.3f, 0.4f, 0.8f});
+  Material wall = make_material(ProgramId::kOpenPbr);
+  wall.openpbr.thin_walled = true;
+  wall.openpbr.transmission_weight = 1;
+  wall.openpbr.transmission_color = {0.9f, 0.5f, 0.7f};
+  wall.roughness = 0;
+  Material solid = wall, rough = wall, textured = wall, metal = wall, glowing = wall, cut = wall;
+  solid.openpbr.thin_walled = false;
+  rough.roughness = 0.4f;
+  textured.textures[static_cast<size_t>(Input::kBaseColor)] = use(0, 0);
+  metal.metallic = 1;
+  glowing.emission = {1, 1, 1};
+  cut.presence = true;
+  cut.opacity = 0.5f;
+  for (const Material& m : {wall, glowing, solid, rough, textured, metal, cut}) b.add_material(m);
+  b.add_to_group(0, b.add_mesh(make_mesh(quad({0, 0, 0}, {1, 0, 0}, {0, 1, 0}), 0)));
+  b.set_camera(make_camera({0, 0, 5}, {0, 0, 0}));
+  const auto scene = b.build();
+  const MaterialView& view = scene->view().materials;
+  for (uint32_t m = 0; m < 7; ++m) {
+    const bool clear = m < 2;
+    EXPECT_EQ(view.straight_table[m] != kNoStraightTable, clear) << m;
+    EXPECT_EQ((view.materials[m].flags & kTransmitsStraight) != 0, clear) << m;
+  }
+  for (uint32_t i = 1; i <= 100; ++i) {
+    const float z = static_cast<float>(i) / 100;
+    const auto cosine = [&](auto /*lanes*/) { return z; };
+    const float r = fresnel_dielectric(z, 1.5f).reflectance, passed = 0.5f * (1 - r) / (1 + r);
+    const MeshHit<float> hit{0, 0, 0, 0.2f, 0.3f};
+    EXPECT_NEAR(straight_transmission<float>(scene->view(), hit, 0, cosine, true).probability,
+                passed, 3e-4f);
+    EXPECT_NEAR(straight_transmission<float>(scene->view(), hit, 1, cosine, true).probability,
+                std::min(passed, kMaxEmissivePassing), 3e-4f);
+  }
 }
 
 }  // namespace

@@ -113,6 +113,8 @@ class Enclosures:
         if self.chance(0.3):
             self.features.append("thin transmission")
             inputs["float transmission_weight"] = number(self.between(0.3, 0.8))
+            self.materials.clear_wall(inputs)
+            self.delta = self.delta or self.materials.delta
         return self.materials.open_pbr_of(inputs)
 
     def glass(self, *, absorbs: bool) -> str:

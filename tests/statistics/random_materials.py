@@ -182,10 +182,21 @@ class Materials:
         if self.chance(0.15):
             inputs["bool geometry_thin_walled"] = "true"
             inputs["float subsurface_weight"] = "0.5"
+            self.clear_wall(inputs)
         if self.chance(0.1):
             self.features.append("film")
             inputs["float thin_film_weight"] = "1"
         return self.open_pbr_of(inputs)
+
+    def clear_wall(self, inputs: dict[str, str]) -> None:
+        """Make a thin wall smooth, so that rays pass straight, if it transmits much light."""
+        if float(inputs.get("float transmission_weight", "0")) < 0.55:
+            return
+        self.delta = True
+        self.features.append("clear wall")
+        for name in ("float specular_roughness", "float coat_roughness"):
+            if name in inputs:
+                inputs[name] = "0"
 
     def open_pbr_of(self, inputs: dict[str, str]) -> str:
         """Add an open_pbr_surface with given inputs ("type name" to value); return its path."""

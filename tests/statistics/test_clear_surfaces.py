@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""UsdPreviewSurface of opacity below 1: rays pass straight through, and so do shadow rays."""
+"""Clear surfaces: rays pass straight through, and so do shadow rays."""
 
 from __future__ import annotations
 
@@ -83,6 +83,71 @@ def test_camera_sees_through_a_pane(tmp_path: Path, beauty: Any) -> None:
     np.testing.assert_allclose(image, np.broadcast_to(expected, image.shape), rtol=8e-3)
 
 
+def wall(name: str, **inputs: object) -> str:
+    """A thin wall of OpenPBR."""
+    types = {"transmission_color": "color3f", "coat_color": "color3f", "base_color": "color3f"}
+    lines = [
+        f"{types.get(key, 'float')} inputs:{key} = {value}"
+        for key, value in {"specular_roughness": 0, "transmission_weight": 1, **inputs}.items()
+    ]
+    return f"""def Material "{name}" {{
+        token outputs:mtlx:surface.connect = </World/{name}/S.outputs:out>
+        def Shader "S" {{
+            uniform token info:id = "ND_open_pbr_surface_surfaceshader"
+            bool inputs:geometry_thin_walled = true
+            {chr(10).join(lines)}
+            token outputs:out
+        }}
+    }}"""
+
+
+def wall_transmission(ior: float, cosine: float) -> float:
+    """1 - 2 R / (1 + R): the transmission of both faces with all interreflections."""
+    r = 1 - transmission(0.0, ior, cosine)
+    return (1 - r) / (1 + r)
+
+
+@pytest.mark.parametrize("tint", [(1, 1, 1), (0.9, 0.5, 0.2)])
+@pytest.mark.parametrize("ior", [1.5, 2.0])
+def test_sun_through_thin_walls(
+    ior: float, tint: tuple[float, ...], tmp_path: Path, beauty: Any
+) -> None:
+    """Shadow rays pass thin walls by their smallest component; bounces find the rest."""
+    eye = camera((6, 0.4, 0), (0, 0, 0), half=1e-3)
+    clear = wall("Clear", specular_ior=ior, transmission_color=tint)
+
+    def floor(count: int) -> NDArray[np.float32]:
+        panes = [pane("Low", 1.0, "Clear"), pane("High", 2.0, "Clear")][:count]
+        stage = write_stage(
+            tmp_path / f"{count}.usda", eye, SUN, WHITE, clear, ground("White"), *panes
+        )
+        image: NDArray[np.float32] = beauty(stage, 4, 4, max_depth=1)
+        return image
+
+    bare = floor(0)
+    once = wall_transmission(ior, np.cos(np.pi / 6)) * min(tint)
+    for count in (1, 2):
+        np.testing.assert_allclose(floor(count) / bare, once**count, rtol=1e-3)
+
+
+def test_camera_sees_through_a_tinted_wall(tmp_path: Path, beauty: Any) -> None:
+    """Traversal and the BSDF together transmit the wall's colour."""
+    eye = camera((2, 3, 0.001), (2, 0, 0), half=0.2)
+    glow = material("Glow", "emissive", emissiveColor=(1, 1, 1))
+    tint = (0.8, 0.4, 0.6)
+    coat = {"coat_weight": 1, "coat_roughness": 0, "coat_color": (0.9, 0.8, 1)}
+    for name, inputs in (("bare", {}), ("coated", coat)):
+        clear = wall("Clear", transmission_color=tint, **inputs)
+        stage = write_stage(
+            tmp_path / f"{name}.usda", eye, glow, clear, ground("Glow"), pane("P", 1.0, "Clear")
+        )
+        image = beauty(stage, 8, 1024, max_depth=2).mean(axis=(0, 1))
+        if name == "bare":
+            np.testing.assert_allclose(image, wall_transmission(1.5, 1) * np.array(tint), rtol=0.01)
+        else:
+            assert (image[:2] < 0.9 * wall_transmission(1.5, 1) * np.array(tint[:2])).all()
+
+
 def showcase(folder: Path) -> Path:
     """A ball in a glass box, a smooth clear ball, leaves and a tinted metal, in sun and lamp."""
     leaf = folder / "leaf.png"
@@ -120,7 +185,13 @@ def showcase(folder: Path) -> Path:
             opacity=0.4,
         ),
         leaves,
+        wall("Window", transmission_color=(0.9, 0.7, 0.5), coat_weight=0.5, coat_roughness=0),
         ground("White", 2.0),
+        quad(
+            "Window1",
+            [(-0.9, 0.0, 1.2), (0.1, 0.0, 1.3), (0.1, 0.9, 1.2), (-0.9, 0.9, 1.1)],
+            "Window",
+        ),
         box("Case", (-1.1, 0.05, -0.4), (-0.1, 1.1, 0.6), "Glass"),
         sphere("Inside", "Red", (-0.6, 0.5, 0.1), 0.35),
         sphere("Smooth", "Ball", (0.6, 0.4, 0.6), 0.35, smooth=True),

@@ -74,8 +74,8 @@ std::vector<uint8_t> filtered_meshes(const Scene& scene) {
   const MeshMediaView& nested_media = scene.view().nested_media;
   if (!scene.view().has_presence && !nested_media.media) return filtered;
   const auto needs = [&](uint32_t m) {
-    const Material& material = scene.material_part()->shaded[m];
-    return material.needs_presence() || material.transmits_straight() || nested_media.is_bound(m);
+    const uint32_t flags = scene.material_part()->records[m].flags;
+    return (flags & (kPresence | kTransmitsStraight)) != 0 || nested_media.is_bound(m);
   };
   const auto& instances = geometry.instance_records;
   const bool inherited = std::any_of(instances.begin(), instances.end(),

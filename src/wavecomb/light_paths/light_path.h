@@ -85,4 +85,15 @@ struct ConnectionTarget {
   Mask<F> is_first;  ///< whether the light path's vertex is the first of its path
 };
 
+/// Returns the flux that reaches a vertex. Absorption between a light and the first vertex is left
+/// out, but not the division by the probability with which traversal stops a ray.
+template <typename Bsdf, typename F, typename V, typename Interaction>
+WAVECOMB_INLINE Color<F> flux_at(const V& v, const Interaction& at, const Mask<F>& is_first) {
+  if constexpr (!Bsdf::kAbsorbs) return at.throughput;
+  Mask<F> unabsorbed = is_first;
+  if constexpr (Bsdf::kAbsorbs && Bsdf::kTransmitsStraight)
+    unabsorbed = is_first & not_(at.bsdf.is_clear());
+  return select<F>(unabsorbed, v.path.throughput, at.throughput);
+}
+
 }  // namespace wavecomb

@@ -94,17 +94,16 @@ WAVECOMB_INLINE LightPathPoint<Bsdf, F, Interaction> light_path_point(const Vert
   c.o = select<F>(from_infinite, at.origin(back), c.o);
   c.d = select<F>(from_infinite, back, c.d);
   const F distance = select(from_infinite, v.t, sqrt(c.distance2));
-  LightPathPoint<Bsdf, F, Interaction> path_point{
-      at,
-      from,
-      at.unadjusted_frame(v),
-      {},
-      F(1.f / select(cosine > 0.f, cosine, F(1.f))),
-      Bsdf::kAbsorbs ? select<F>(is_first, v.path.throughput, at.throughput) : at.throughput,
-      F(0.f),
-      F(0.f),
-      Mask<F>(false),
-      Mask<F>(false)};
+  LightPathPoint<Bsdf, F, Interaction> path_point{at,
+                                                  from,
+                                                  at.unadjusted_frame(v),
+                                                  {},
+                                                  F(1.f / select(cosine > 0.f, cosine, F(1.f))),
+                                                  flux_at<Bsdf, F>(v, at, is_first),
+                                                  F(0.f),
+                                                  F(0.f),
+                                                  Mask<F>(false),
+                                                  Mask<F>(false)};
   path_point.l = path_point.frame.to_local(c.d);
   path_point.active =
       v.active & (cosine > 0.f) & (from_infinite | c.valid) & at.is_consistent(c.d, path_point.l);

@@ -11,6 +11,12 @@
 
 namespace wavecomb {
 
+/// Inputs of OpenPBR that may read textures, except emission and opacity.
+inline constexpr uint32_t kOpenPbrInputs =
+    input_bit(Input::kBaseColor) | input_bit(Input::kSpecularColor) | input_bit(Input::kRoughness) |
+    input_bit(Input::kMetallic) | input_bit(Input::kClearcoat) |
+    input_bit(Input::kClearcoatRoughness) | input_bit(Input::kNormal) | kNeedsTangent;
+
 /// Parameters of the program "openpbr" at a hit. ShadingParams holds the inputs shared with other
 /// programs: `roughness` is the specular roughness, and `clearcoat` and `clearcoat_roughness` are
 /// the coat's weight and roughness. The struct OpenPbr (material/description/openpbr_inputs.h)

@@ -13,6 +13,12 @@ namespace wavecomb {
 /// Upper limit of the index of refraction; the lower limit is its inverse.
 inline constexpr float kMaxIor = 10.f;
 
+/// Returns the lanes whose materials may transmit light straight.
+template <typename F>
+inline Mask<F> transmits_straight(const UInt<F>& flags) {
+  return Mask<F>((flags & UInt<F>(uint32_t{kTransmitsStraight})) != UInt<F>(0u));
+}
+
 namespace detail {
 
 template <uint32_t kInputs, typename F>

@@ -8,6 +8,7 @@
 #include "wavecomb/material/description/simplified_material.h"
 #include "wavecomb/material/description/variants.h"
 #include "wavecomb/material/lobes/straight_transmission.h"
+#include "wavecomb/material/programs/openpbr.h"
 #include "wavecomb/scene/scene_parts.h"
 
 namespace wavecomb {
@@ -107,26 +108,55 @@ TextureUseRecord make_use_record(const TextureUse& use) {
   return r;
 }
 
-/// Returns whether straight transmission depends on nothing but the cosine.
-bool has_straight_table(const Material& m) {
-  if (!m.transmits_straight() || m.graph != kNoGraph || m.opacity_graph != kNoGraph) return false;
+/// Returns whether the inputs on which straight transmission depends are constant.
+bool has_constant_transmission(const Material& m) {
+  if (m.graph != kNoGraph || m.opacity_graph != kNoGraph) return false;
   for (uint32_t s = 0; s < kInputCount; ++s)
     if ((kStraightInputs >> s & 1u) != 0 && m.has_texture(static_cast<Input>(s))) return false;
   return true;
 }
 
-/// Tabulates the straight transmission of materials with constant inputs.
+/// Returns whether light may pass straight through a thin wall of OpenPBR.
+bool is_clear_wall(const Material& m) {
+  return has_trait(m.program, program_trait::kLayered) && m.openpbr.thin_walled &&
+         m.openpbr.transmission_weight > 0 && !m.needs_presence() && has_constant_transmission(m);
+}
+
+/// Tabulates the straight transmission of a thin wall. All values are 0 if the wall is rough.
+StraightTable wall_table(MaterialView view, uint32_t material, const Material& m) {
+  view.energy = energy_tables({&m, 1});
+  const auto no_graph = [](bool) { return GraphPoint<float>(); };
+  const OpenPbrBsdf<float, kAllParts> wall(
+      OpenPbrParams<float>::fetch<0, false>(view, material, {0, 0}, 0.f, no_graph, true), false);
+  const float most = m.emits() ? kMaxEmissivePassing : 1.f;
+  return make_straight_table([&](float z) {
+    const Vec3<float> wo(std::sqrt(std::max(1 - z * z, 0.f)), 0, z);
+    const Color<float> passed = wall.straight(wall.view(wo));
+    return std::clamp(std::min({passed.x, passed.y, passed.z}), 0.f, most);
+  });
+}
+
+/// Tabulates the straight transmission of materials with constant inputs, and marks the thin walls
+/// that transmit straight.
 void add_straight_tables(SceneMaterials& all) {
-  const auto found = std::ranges::count_if(all.shaded, has_straight_table);
-  if (found == 0) return;
-  all.straight_table.assign(all.shaded.size(), kNoStraightTable);
-  all.straight_tables.reserve(static_cast<size_t>(found) * kStraightNodes);
   MaterialView view;
   view.materials = all.records.data();
+  view.openpbr = all.openpbr.data();
   for (uint32_t m = 0; m < all.shaded.size(); ++m) {
-    if (!has_straight_table(all.shaded[m])) continue;
+    const Material& material = all.shaded[m];
+    StraightTable table;
+    if (material.transmits_straight() && has_constant_transmission(material))
+      table = preview_surface_table(view, m);
+    else if (is_clear_wall(material))
+      table = wall_table(view, m, material);
+    else
+      continue;
+    if (std::ranges::none_of(table, [](float passing) { return passing > 0; })) continue;
+    all.records[m].flags |= kTransmitsStraight;
+    all.has_presence = true;
+    all.straight_table.resize(all.shaded.size(), kNoStraightTable);
     all.straight_table[m] = static_cast<uint32_t>(all.straight_tables.size() / kStraightNodes);
-    append_straight_table(view, m, all.straight_tables);
+    all.straight_tables.insert(all.straight_tables.end(), table.begin(), table.end());
   }
 }
 

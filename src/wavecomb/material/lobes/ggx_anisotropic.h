@@ -59,4 +59,27 @@ struct AnisotropicGgx {
   }
 };
 
+/// Rotation about z. A rotation by an angle of 0 leaves directions bitwise unchanged, including the
+/// sign of zero components.
+template <typename F>
+struct Turn {
+  F cos, sin;
+
+  Turn() = default;
+  /// `turns` is the angle in units of a full turn.
+  explicit Turn(const F& turns) {
+    const SinCos<F> turn = sincos_2pi(turns);
+    cos = turn.cos;
+    sin = turn.sin;
+  }
+  Vec3<F> to(const Vec3<F>& w) const {
+    const Vec3<F> t(fma(cos, w.x, F(sin * w.y)), fma(cos, w.y, F(-(sin * w.x))), w.z);
+    return select<F>(sin != 0.f, t, w);
+  }
+  Vec3<F> back(const Vec3<F>& w) const {
+    const Vec3<F> t(fma(cos, w.x, F(-(sin * w.y))), fma(sin, w.x, F(cos * w.y)), w.z);
+    return select<F>(sin != 0.f, t, w);
+  }
+};
+
 }  // namespace wavecomb

@@ -125,6 +125,7 @@ struct OpenPbrBase {
     F gloss_scale;
     Color<F> metal_scale;
     Color<F> gloss;   ///< albedo of the interface over the diffuse base
+    Color<F> kept;    ///< fraction of the transmission that ray traversal leaves to the BSDF
     Color<F> albedo;  ///< estimate of reflection plus transmission
   };
 
@@ -164,6 +165,7 @@ struct OpenPbrBase {
     v.metal_scale = one + metal_fresnel.f0 * lost;
     v.gloss_scale = fma(f0_from_ior(gloss_ior), lost, F(1.f));
     v.glass_scale = F(1.f);
+    v.kept = one;
     if (kGlass && any(Mask<F>(glass > 0.f))) {
       const F scattered = select(thin, white, max(lookup.scattered(v.eta), F(1e-3f)));
       v.glass_scale = select(smooth | (v.brushed & not_(thin)), F(1.f), F(1.f / scattered));
@@ -174,9 +176,25 @@ struct OpenPbrBase {
     v.gloss = Color<F>(gloss);
     if (kFilm && any(Mask<F>(film.weight > 0.f)))
       v.gloss = lerp(v.gloss, filmed_gloss(v, z, lookup), film.weight);
-    const OpenPbrFacet<F> f = facet(v, z);
-    v.albedo = min(Color<F>(f.reflect + f.transmit), one);
+    v.albedo = albedo_of(facet(v, z));
     return v;
+  }
+
+  /// Subtracts the fraction `passing`, which ray traversal transmits, from what clear walls
+  /// transmit straight, `passed`. A remainder of rounding errors is ignored.
+  [[gnu::noinline, gnu::cold]] void keep_rest(const Color<F>& passed, const F& passing,
+                                              const Mask<F>& clear, const F& z, View& v) const {
+    const Color<F> zero(F(0.f)), one(F(1.f));
+    const Color<F> rest = max(Color<F>(passed - Color<F>(passing)), zero);
+    const Mask<F> real = max_component(rest) > 5e-4f;
+    const Color<F> whole = max(passed, Color<F>(F(1e-20f)));
+    const Color<F> kept{rest.x / whole.x, rest.y / whole.y, rest.z / whole.z};
+    v.kept = select<F>(clear, select<F>(real, kept, zero), one);
+    v.albedo = albedo_of(facet(v, z));
+  }
+
+  static Color<F> albedo_of(const OpenPbrFacet<F>& f) {
+    return min(Color<F>(f.reflect + f.transmit), Color<F>(F(1.f)));
   }
 
   /// Colours of a microfacet seen at cosine c, including compensation.
@@ -222,7 +240,7 @@ struct OpenPbrBase {
                           scale);
       }
       f.reflect += specular_color * g * scale;
-      f.transmit = tint * Color<F>(one - g) * scale;
+      f.transmit = tint * Color<F>(one - g) * scale * v.kept;
     }
     return f;
   }

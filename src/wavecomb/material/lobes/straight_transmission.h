@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Straight transmission of UsdPreviewSurface, which ray traversal samples.
+/// Straight transmission of UsdPreviewSurface and of smooth thin walls of OpenPBR, which ray
+/// traversal samples.
 ///
-/// Where opacity is below 1, the surface lets the fraction T of the light pass without a change of
-/// direction (PrincipledLayers::straight). Traversal lets each ray pass with the probability T
+/// Where the opacity of UsdPreviewSurface is below 1, or where a thin wall transmits, the surface
+/// lets the fraction T of the light pass without a change of direction (PrincipledLayers::straight,
+/// OpenPbrBsdf::straight). Traversal lets each ray pass with the probability T
 /// (its smallest component, if T is coloured, and at most kMaxEmissivePassing on emissive
 /// surfaces), and multiplies the contribution of a shadow ray by T instead. A path that is stopped,
 /// with the probability 1 - T, has the throughput
@@ -13,10 +15,11 @@
 ///
 /// The probability depends on the shading normal without normal map, and on inputs at the finest
 /// texture level, so that traversal and shading compute the same value. If all inputs are constant,
-/// both look it up in a table over the cosine, since traversal calls it for each hit.
+/// both look it up in a table over the cosine, since traversal needs it at each hit. Thin walls
+/// whose inputs are not constant transmit light by a delta lobe of the BSDF instead.
 #pragma once
 
-#include <vector>
+#include <array>
 
 #include "wavecomb/geometry/hit/surface.h"
 #include "wavecomb/material/inputs/presence.h"
@@ -29,8 +32,15 @@ namespace wavecomb {
 template <typename F>
 struct StraightTransmission {
   F probability;  ///< probability with which a ray passes, from 0 to 1
-  F opacity;      ///< opacity at the finest texture level
+  F opacity;      ///< opacity of UsdPreviewSurface, at the finest texture level
 };
+
+/// Returns the parameter `opacity` of a BSDF of type `Bsdf`: the opacity, or, for OpenPBR, the
+/// probability with which ray traversal stops a ray.
+template <typename Bsdf, typename F>
+inline F opacity_for(const StraightTransmission<F>& straight) {
+  return Bsdf::kHasOpacity ? straight.opacity : F(1.f - straight.probability);
+}
 
 /// Inputs on which straight transmission depends.
 inline constexpr uint32_t kStraightInputs = kPrincipledInputs & ~input_bit(Input::kNormal);
@@ -38,6 +48,20 @@ inline constexpr uint32_t kStraightInputs = kPrincipledInputs & ~input_bit(Input
 /// Number of nodes of a table of straight transmission. The nodes are uniform in sqrt(cosine), and
 /// linear interpolation errs by at most 3e-4.
 inline constexpr uint32_t kStraightNodes = 129;
+
+/// Probabilities with which rays pass a surface, by sqrt(cosine).
+using StraightTable = std::array<float, kStraightNodes>;
+
+/// Tabulates `passing(cosine)`.
+template <typename Passing>
+inline StraightTable make_straight_table(const Passing& passing) {
+  StraightTable table;
+  for (uint32_t i = 0; i < kStraightNodes; ++i) {
+    const float x = static_cast<float>(i) / (kStraightNodes - 1);
+    table[i] = passing(x * x);
+  }
+  return table;
+}
 
 namespace detail {
 
@@ -64,21 +88,11 @@ inline F tabulated_passing(const float* tables, const UInt<F>& index, const F& z
 
 }  // namespace detail
 
-/// Appends the table of a material whose inputs are constant to `tables`.
-inline void append_straight_table(const MaterialView& view, uint32_t material,
-                                  std::vector<float>& tables) {
+/// Returns the table of a material of UsdPreviewSurface whose inputs are constant.
+inline StraightTable preview_surface_table(const MaterialView& view, uint32_t material) {
   const auto params = fetch_params<0, float>(view, material, {0, 0}, Footprint<float>(0.f), true);
   const detail::StraightLayers<float> layers(params, false);
-  for (uint32_t i = 0; i < kStraightNodes; ++i) {
-    const float x = static_cast<float>(i) / (kStraightNodes - 1);
-    tables.push_back(detail::passing_at<float>(layers, x * x));
-  }
-}
-
-/// Returns the lanes whose materials may transmit light straight.
-template <typename F>
-inline Mask<F> transmits_straight(const UInt<F>& flags) {
-  return Mask<F>((flags & UInt<F>(uint32_t{kTransmitsStraight})) != UInt<F>(0u));
+  return make_straight_table([&](float z) { return detail::passing_at<float>(layers, z); });
 }
 
 /// Returns the cosine on which straight transmission along `dir` depends. It is the same for the

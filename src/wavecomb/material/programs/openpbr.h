@@ -22,9 +22,10 @@ namespace wavecomb {
 ///
 /// Opaque and thin-walled surfaces are two-sided. Inside a transmissive solid there is no fuzz, and
 /// the coat does not reflect. Subsurface scattering is diffuse reflection, or, with random walks,
-/// enters through a diffuse lobe to the other side (medium/subsurface/random_walk.h). A program
-/// variant (material/description/variants.h) supports only some features. For materials without
-/// other features, its results are bitwise equal to those of the complete program.
+/// enters through a diffuse lobe to the other side (medium/subsurface/random_walk.h). Ray traversal
+/// transmits through smooth thin walls (lobes/straight_transmission.h). A program variant
+/// (material/description/variants.h) supports only some features, and equals the complete program
+/// bitwise for materials without other features.
 template <typename F, uint32_t kParts>
 class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   using Viewed = ViewedBsdf<OpenPbrBsdf<F, kParts>, F>;
@@ -40,19 +41,15 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   static constexpr bool kAbsorbs = (kParts & kTransmissionPart) != 0;
   // The same for all variants, because light selection in the light tree depends on this value.
   static constexpr bool kTransmits = true;
+  static constexpr bool kTransmitsStraight = Base::kGlass;
   static constexpr bool kHasSubsurface = kBack;
   static constexpr bool kTextured = (kParts & (kTexturePart | kAnisotropyPart)) != 0;
   using Params = OpenPbrParams<F>;
   /// Inputs that may read textures: all or none, since any texture aligns the tangent frame.
-  static constexpr uint32_t kInputs =
-      !kTextured ? 0u
-                 : input_bit(Input::kBaseColor) | input_bit(Input::kSpecularColor) |
-                       input_bit(Input::kRoughness) | input_bit(Input::kMetallic) |
-                       input_bit(Input::kClearcoat) | input_bit(Input::kClearcoatRoughness) |
-                       input_bit(Input::kNormal) | kNeedsTangent;
+  static constexpr uint32_t kInputs = kTextured ? kOpenPbrInputs : 0u;
 
   OpenPbrBsdf(const Params& p, bool /*schlick: the terms are always exact*/)
-      : base_(p), eon_(p.diffuse_roughness), energy_(p.energy) {
+      : base_(p), eon_(p.diffuse_roughness), energy_(p.energy), passing_(1.f - p.opacity) {
     if constexpr (kFuzz) {
       fuzz_ = p.fuzz_weight;
       fuzz_roughness_ = p.fuzz_roughness;
@@ -74,11 +71,8 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
       back_ = select<F>(lambertian, Color<F>(sub), returned_back_);
     }
     diffuse_ = lerp(p.base_color, under, sub);
-    if constexpr (kTurned) {
-      const SinCos<F> turn = sincos_2pi(p.rotation);
-      turn_cos_ = turn.cos;
-      turn_sin_ = turn.sin;
-    }
+    if constexpr (kTransmitsStraight) clear_ = transmits_straight<F>(p.flags);
+    if constexpr (kTurned) turn_ = Turn<F>(p.rotation);
   }
 
   Color<F> albedo() const {
@@ -100,6 +94,9 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
     if constexpr (!kBack) return Mask<F>(false);
     return subsurface_ & (wo.z > 0.f) & (wi.z < 0.f);
   }
+
+  /// Lanes whose surfaces ray traversal lets rays pass. They absorb nothing along rays.
+  Mask<F> is_clear() const { return clear_; }
 
   /// Lanes whose light samples may lie on the other side of the surface.
   Mask<F> passes_light() const {
@@ -165,8 +162,18 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
       v.bare = Color<F>(F(v.under_fuzz * F(1.f - coat_.weight)));
       v.coated = darkened(v, z) * coat_.tint(z) * F(v.under_fuzz * F(coat_.weight - coat_albedo));
     }
+    if (kTransmitsStraight && any(clear_)) [[unlikely]]
+      base_.keep_rest(straight(v), passing_, clear_, z, v.base);
     choose_shares(v, F(v.under_fuzz * coat_albedo));
     return v;
+  }
+
+  /// Returns the fraction of light that passes straight through a smooth thin wall towards the
+  /// viewer, except for what ray traversal transmits (lobes/straight_transmission.h).
+  Color<F> straight(const View& v) const {
+    const Color<F> passed =
+        base_.facet(v.base, v.o.z).transmit * below(v, Vec3<F>(-v.o.x, -v.o.y, F(-v.o.z)));
+    return select<F>(base_.smooth & base_.thin, passed, Color<F>(F(0.f)));
   }
 
   using Viewed::delta_probability, Viewed::eval, Viewed::diffuse_f_cos, Viewed::sample;
@@ -280,22 +287,10 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   }
 
   Vec3<F> to_view(const View& v, const Vec3<F>& w) const { return turned(mirror_z(w, v.side)); }
-  /// Rotates a direction into the frame of anisotropy; turned_back() inverts this. A rotation by an
-  /// angle of 0 leaves directions bitwise unchanged, including the sign of zero components.
-  Vec3<F> turned(const Vec3<F>& w) const {
-    if constexpr (!kTurned) return w;
-    const Vec3<F> t(fma(turn_cos_, w.x, F(turn_sin_ * w.y)),
-                    fma(turn_cos_, w.y, F(-(turn_sin_ * w.x))), w.z);
-    return select<F>(turn_sin_ != 0.f, t, w);
-  }
-  Vec3<F> turned_back(const Vec3<F>& w) const {
-    if constexpr (!kTurned) return w;
-    const Vec3<F> t(fma(turn_cos_, w.x, F(-(turn_sin_ * w.y))),
-                    fma(turn_sin_, w.x, F(turn_cos_ * w.y)), w.z);
-    return select<F>(turn_sin_ != 0.f, t, w);
-  }
+  /// Rotates a direction into the frame of anisotropy; from_view() inverts this.
+  Vec3<F> turned(const Vec3<F>& w) const { return kTurned ? turn_.to(w) : w; }
   Vec3<F> from_view(const View& v, const Vec3<F>& w) const {
-    return mirror_z(turned_back(w), v.side);
+    return mirror_z(kTurned ? turn_.back(w) : w, v.side);
   }
 
   F coat_reflectance(const View& v, const F& cos_h) const {
@@ -391,7 +386,10 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   EonDiffuse<F> eon_;
   const float* energy_;
   OpenPbrCoat<F> coat_;
-  F fuzz_, fuzz_roughness_, turn_cos_, turn_sin_;
+  F fuzz_, fuzz_roughness_;
+  Turn<F> turn_;
+  F passing_;             ///< probability with which ray traversal lets rays pass clear walls
+  Mask<F> clear_{false};  ///< thin walls that transmit straight
   Color<F> fuzz_color_, diffuse_, back_;
   Color<F> returned_back_;  ///< colour of light that enters through the lobe `back_` and returns
   Mask<F> subsurface_{false};
