@@ -47,9 +47,11 @@ set(lane_sources ${core_sources})
 list(FILTER lane_sources INCLUDE REGEX "\\.lanes\\.cpp$")
 list(FILTER core_sources EXCLUDE REGEX "\\.lanes\\.cpp$|/render/lane_kernels\\.cpp$")
 # The sources of light kinds and light filters, bare_traversal.cpp and ears.cpp are excluded from
-# unity batches (WAVECOMB_BATCH), because their local names collide with names in other sources.
+# unity batches (WAVECOMB_BATCH), because their local names collide with names in other sources, and
+# openpbr_wall.cpp, so that no batch depends on a program.
 file(GLOB alone "${PROJECT_SOURCE_DIR}/src/wavecomb/light/kinds/*.cpp" "${PROJECT_SOURCE_DIR}/src/wavecomb/light/filters/*.cpp")
-list(APPEND alone "${PROJECT_SOURCE_DIR}/src/wavecomb/accel/bare_traversal.cpp" "${PROJECT_SOURCE_DIR}/src/wavecomb/geometry/tessellation/ears.cpp")
+list(APPEND alone "${PROJECT_SOURCE_DIR}/src/wavecomb/material/programs/openpbr_wall.cpp"
+  "${PROJECT_SOURCE_DIR}/src/wavecomb/accel/bare_traversal.cpp" "${PROJECT_SOURCE_DIR}/src/wavecomb/geometry/tessellation/ears.cpp")
 set(refiner "${PROJECT_SOURCE_DIR}/src/wavecomb/geometry/tessellation/subdivision.cpp")
 set_source_files_properties(${alone} ${refiner} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 if(WAVECOMB_SANITIZE)

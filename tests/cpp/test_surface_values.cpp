@@ -246,6 +246,9 @@ TEST(SurfaceValues, TablesOfStraightTransmissionAreThoseOfTheLayers) {
   for (uint32_t m = 0; m < materials.size(); ++m) {
     const bool constant = m + 2 < materials.size();
     ASSERT_EQ(view.materials.straight_table[m] != kNoStraightTable, constant) << m;
+    const auto not_a_number = [](auto /*lanes*/) { return kNan; };
+    const float at_nan = straight_transmission<float>(view, hit, m, not_a_number, true).probability;
+    EXPECT_TRUE(!constant || (at_nan >= 0 && at_nan <= 1)) << m << " " << at_nan;
     for (uint32_t i = 0; i <= 1000; ++i) {
       const float z = static_cast<float>(i) / 1000;
       const auto cosine = [&](auto /*lanes*/) { return z; };

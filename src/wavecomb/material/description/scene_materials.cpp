@@ -8,7 +8,6 @@
 #include "wavecomb/material/description/simplified_material.h"
 #include "wavecomb/material/description/variants.h"
 #include "wavecomb/material/lobes/straight_transmission.h"
-#include "wavecomb/material/programs/openpbr.h"
 #include "wavecomb/scene/scene_parts.h"
 
 namespace wavecomb {
@@ -120,20 +119,6 @@ bool has_constant_transmission(const Material& m) {
 bool is_clear_wall(const Material& m) {
   return has_trait(m.program, program_trait::kLayered) && m.openpbr.thin_walled &&
          m.openpbr.transmission_weight > 0 && !m.needs_presence() && has_constant_transmission(m);
-}
-
-/// Tabulates the straight transmission of a thin wall. All values are 0 if the wall is rough.
-StraightTable wall_table(MaterialView view, uint32_t material, const Material& m) {
-  view.energy = energy_tables({&m, 1});
-  const auto no_graph = [](bool) { return GraphPoint<float>(); };
-  const OpenPbrBsdf<float, kAllParts> wall(
-      OpenPbrParams<float>::fetch<0, false>(view, material, {0, 0}, 0.f, no_graph, true), false);
-  const float most = m.emits() ? kMaxEmissivePassing : 1.f;
-  return make_straight_table([&](float z) {
-    const Vec3<float> wo(std::sqrt(std::max(1 - z * z, 0.f)), 0, z);
-    const Color<float> passed = wall.straight(wall.view(wo));
-    return std::clamp(std::min({passed.x, passed.y, passed.z}), 0.f, most);
-  });
 }
 
 /// Tabulates the straight transmission of materials with constant inputs, and marks the thin walls

@@ -79,7 +79,8 @@ inline F passing_at(const StraightLayers<F>& layers, const F& z) {
 template <typename F>
 inline F tabulated_passing(const float* tables, const UInt<F>& index, const F& z,
                            const Mask<F>& active) {
-  const F x = sqrt(z) * static_cast<float>(kStraightNodes - 1);
+  // The cosine of a triangle whose area overflows is NaN, which saturate() maps to 0.
+  const F x = sqrt(saturate(z)) * static_cast<float>(kStraightNodes - 1);
   const F below = min(floor(x), F(static_cast<float>(kStraightNodes - 2)));
   const UInt<F> at = index * kStraightNodes + UInt<F>(to_int<F>(below));
   const F a = gather<F>(tables, at, active), b = gather<F>(tables, at + 1u, active);
@@ -94,6 +95,10 @@ inline StraightTable preview_surface_table(const MaterialView& view, uint32_t ma
   const detail::StraightLayers<float> layers(params, false);
   return make_straight_table([&](float z) { return detail::passing_at<float>(layers, z); });
 }
+
+/// Returns the table of a thin wall of OpenPBR, material `m`, whose inputs are constant. All values
+/// are 0 if the wall is rough.
+StraightTable wall_table(MaterialView view, uint32_t material, const Material& m);
 
 /// Returns the cosine on which straight transmission along `dir` depends. It is the same for the
 /// opposite direction.
