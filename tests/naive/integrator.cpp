@@ -237,7 +237,7 @@ class Integrator {
     const auto cosine = [&](bool) { return straight_cosine<F>(at.s, ray.d); };
     const StraightTransmission<F> t =
         straight_transmission<F>(scene_, on_mesh, material, cosine, true);
-    at.params.opacity = opacity_for<Bsdf, F>(t);
+    at.params.opacity = t.opacity;
     if (t.probability == 0.f) return Rgb(0.f);
     Ray behind = ray;
     behind.o = spawn_origin<F>(at.s, ray.d);

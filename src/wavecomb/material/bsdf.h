@@ -47,9 +47,6 @@ struct BsdfTraits {
   static constexpr bool kTransmits = false;
   /// Whether ray traversal may let light pass straight (lobes/straight_transmission.h).
   static constexpr bool kTransmitsStraight = false;
-  /// Whether `ShadingParams::opacity` is an input of the program. Otherwise, it is the probability
-  /// with which ray traversal stops a ray, for materials that transmit straight.
-  static constexpr bool kHasOpacity = false;
   /// Whether the program has subsurface random walks; if so, the class has `enters(wo, wi)`.
   static constexpr bool kHasSubsurface = false;
   /// Whether ray origins are offset to hide artefacts at the shadow terminator.

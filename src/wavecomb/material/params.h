@@ -19,6 +19,24 @@ inline Mask<F> transmits_straight(const UInt<F>& flags) {
   return Mask<F>((flags & UInt<F>(uint32_t{kTransmitsStraight})) != UInt<F>(0u));
 }
 
+/// Upper limit of the probability with which rays pass an emissive surface, whose emission is
+/// divided by the probability of hitting it.
+inline constexpr float kMaxEmissivePassing = 0.75f;
+
+/// Returns the upper limit of the probability with which rays pass surfaces with these flags.
+template <typename F>
+inline F most_passing(const UInt<F>& flags) {
+  const Mask<F> emits((flags & UInt<F>(uint32_t{kEmits})) != UInt<F>(0u));
+  return select(emits, F(kMaxEmissivePassing), F(1.f));
+}
+
+/// Returns the probability with which ray traversal lets rays pass surfaces that transmit the
+/// fraction `straight`: its smallest component, at most `most`. The BSDF transmits the rest.
+template <typename F>
+inline F passing_probability(const Color<F>& straight, const F& most) {
+  return clamp(min(straight.x, min(straight.y, straight.z)), F(0.f), most);
+}
+
 namespace detail {
 
 template <uint32_t kInputs, typename F>

@@ -115,10 +115,12 @@ bool has_constant_transmission(const Material& m) {
   return true;
 }
 
-/// Returns whether light may pass straight through a thin wall of OpenPBR.
+/// Returns whether light may pass straight through a thin wall of OpenPBR. Where the index is below
+/// 1, total reflection makes transmission too steep for a table.
 bool is_clear_wall(const Material& m) {
   return has_trait(m.program, program_trait::kLayered) && m.openpbr.thin_walled &&
-         m.openpbr.transmission_weight > 0 && !m.needs_presence() && has_constant_transmission(m);
+         m.openpbr.transmission_weight > 0 && m.ior >= 1 && !m.needs_presence() &&
+         has_constant_transmission(m);
 }
 
 /// Tabulates the straight transmission of materials with constant inputs, and marks the thin walls

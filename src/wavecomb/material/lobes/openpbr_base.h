@@ -180,16 +180,16 @@ struct OpenPbrBase {
     return v;
   }
 
-  /// Subtracts the fraction `passing`, which ray traversal transmits, from what clear walls
-  /// transmit straight, `passed`. A remainder of rounding errors is ignored.
-  [[gnu::noinline, gnu::cold]] void keep_rest(const Color<F>& passed, const F& passing,
+  /// Subtracts what ray traversal transmits from what clear walls transmit straight, `passed`.
+  /// `most` is most_passing(). The rest depends on the view only, so that all techniques compute
+  /// the same densities. A rest of rounding errors is ignored.
+  [[gnu::noinline, gnu::cold]] void keep_rest(const Color<F>& passed, const F& most,
                                               const Mask<F>& clear, const F& z, View& v) const {
-    const Color<F> zero(F(0.f)), one(F(1.f));
-    const Color<F> rest = max(Color<F>(passed - Color<F>(passing)), zero);
-    const Mask<F> real = max_component(rest) > 5e-4f;
+    const Color<F> rest = passed - Color<F>(passing_probability<F>(passed, most));
+    const Mask<F> real = max_component(rest) > F(1e-5f * max_component(passed));
     const Color<F> whole = max(passed, Color<F>(F(1e-20f)));
     const Color<F> kept{rest.x / whole.x, rest.y / whole.y, rest.z / whole.z};
-    v.kept = select<F>(clear, select<F>(real, kept, zero), one);
+    v.kept = select<F>(clear, select<F>(real, kept, Color<F>(F(0.f))), Color<F>(F(1.f)));
     v.albedo = albedo_of(facet(v, z));
   }
 

@@ -11,6 +11,7 @@
 #include "wavecomb/material/lobes/ggx.h"
 #include "wavecomb/material/lobes/multiple_scattering.h"
 #include "wavecomb/material/lobes/rough_interface.h"
+#include "wavecomb/material/params.h"
 
 namespace wavecomb {
 
@@ -19,10 +20,6 @@ inline constexpr uint32_t kPrincipledInputs =
     input_bit(Input::kBaseColor) | input_bit(Input::kSpecularColor) | input_bit(Input::kRoughness) |
     input_bit(Input::kMetallic) | input_bit(Input::kClearcoat) |
     input_bit(Input::kClearcoatRoughness) | input_bit(Input::kOpacity) | input_bit(Input::kNormal);
-
-/// Upper limit of the probability with which rays pass an emissive surface, whose emission is
-/// divided by the probability of hitting it.
-inline constexpr float kMaxEmissivePassing = 0.75f;
 
 /// Parameters of the layers of UsdPreviewSurface at a hit: clearcoat over a specular interface over
 /// a base. Shading (programs/principled.h) and ray traversal (lobes/straight_transmission.h) use
@@ -57,8 +54,7 @@ class PrincipledLayers {
       diffuse_ = diffuse_ * F(F(1.f - metallic) * (kStraight ? params.opacity : F(1.f)));
     if constexpr (kStraight) {
       transparency_ = F(1.f - params.opacity);
-      const Mask<F> emits = Mask<F>((params.flags & UInt<F>(uint32_t{kEmits})) != UInt<F>(0u));
-      most_passing_ = select(emits, F(kMaxEmissivePassing), F(1.f));
+      most_passing_ = most_passing<F>(params.flags);
     }
     interface_ = CoatFresnel<F>(ior, exact);
     const F alpha = alpha_from_roughness(roughness_);
@@ -99,7 +95,7 @@ class PrincipledLayers {
   /// fraction `straight`: its smallest component, with a limit for emissive surfaces. The BSDF
   /// transmits the rest.
   F passing_probability(const Color<F>& straight) const {
-    return clamp(min(straight.x, min(straight.y, straight.z)), F(0.f), most_passing_);
+    return wavecomb::passing_probability<F>(straight, most_passing_);
   }
 
  protected:

@@ -35,13 +35,6 @@ struct StraightTransmission {
   F opacity;      ///< opacity of UsdPreviewSurface, at the finest texture level
 };
 
-/// Returns the parameter `opacity` of a BSDF of type `Bsdf`: the opacity, or, for OpenPBR, the
-/// probability with which ray traversal stops a ray.
-template <typename Bsdf, typename F>
-inline F opacity_for(const StraightTransmission<F>& straight) {
-  return Bsdf::kHasOpacity ? straight.opacity : F(1.f - straight.probability);
-}
-
 /// Inputs on which straight transmission depends.
 inline constexpr uint32_t kStraightInputs = kPrincipledInputs & ~input_bit(Input::kNormal);
 

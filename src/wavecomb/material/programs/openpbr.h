@@ -49,7 +49,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   static constexpr uint32_t kInputs = kTextured ? kOpenPbrInputs : 0u;
 
   OpenPbrBsdf(const Params& p, bool /*schlick: the terms are always exact*/)
-      : base_(p), eon_(p.diffuse_roughness), energy_(p.energy), passing_(1.f - p.opacity) {
+      : base_(p), eon_(p.diffuse_roughness), energy_(p.energy), most_(most_passing<F>(p.flags)) {
     if constexpr (kFuzz) {
       fuzz_ = p.fuzz_weight;
       fuzz_roughness_ = p.fuzz_roughness;
@@ -163,7 +163,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
       v.coated = darkened(v, z) * coat_.tint(z) * F(v.under_fuzz * F(coat_.weight - coat_albedo));
     }
     if (kTransmitsStraight && any(clear_)) [[unlikely]]
-      base_.keep_rest(straight(v), passing_, clear_, z, v.base);
+      base_.keep_rest(straight(v), most_, clear_, z, v.base);
     choose_shares(v, F(v.under_fuzz * coat_albedo));
     return v;
   }
@@ -388,7 +388,7 @@ class OpenPbrBsdf : public ViewedBsdf<OpenPbrBsdf<F, kParts>, F> {
   OpenPbrCoat<F> coat_;
   F fuzz_, fuzz_roughness_;
   Turn<F> turn_;
-  F passing_;             ///< probability with which ray traversal lets rays pass clear walls
+  F most_;                ///< most_passing()
   Mask<F> clear_{false};  ///< thin walls that transmit straight
   Color<F> fuzz_color_, diffuse_, back_;
   Color<F> returned_back_;  ///< colour of light that enters through the lobe `back_` and returns

@@ -18,7 +18,7 @@ StraightTable wall_table(MaterialView view, uint32_t material, const Material& m
   return make_straight_table([&](float z) {
     const Vec3<float> wo(std::sqrt(std::max(1 - z * z, 0.f)), 0, z);
     const Color<float> passed = wall.straight(wall.view(wo));
-    return std::clamp(std::min({passed.x, passed.y, passed.z}), 0.f, most);
+    return passing_probability<float>(passed, most);
   });
 }
 

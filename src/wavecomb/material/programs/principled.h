@@ -42,7 +42,6 @@ class PrincipledBsdf : public ViewedBsdf<PrincipledBsdf<F, kParts>, F>,
   static constexpr bool kEmits = (kParts & kEmissionPart) != 0;
   static constexpr bool kTextured = (kParts & kTexturePart) != 0;
   static constexpr bool kTransmitsStraight = Layers::kStraight;
-  static constexpr bool kHasOpacity = true;
   /// Inputs that may read textures. The mask has either all inputs or none, because even one
   /// textured input aligns the tangent frame with the texture.
   static constexpr uint32_t kInputs = !kTextured ? 0u : kPrincipledInputs;

@@ -154,7 +154,7 @@ WAVECOMB_INLINE MaterialLookup<Bsdf, F> look_up_material(const Vertex<F, kFeatur
       const auto cosine = [&](const Mask<F>& /*lanes*/) { return straight_cosine<F>(s, path.dir); };
       const StraightTransmission<F> straight =
           straight_transmission<F>(v.scene, v.hit, v.material, cosine, clear);
-      params.opacity = select(clear, opacity_for<Bsdf, F>(straight), params.opacity);
+      params.opacity = select(clear, straight.opacity, params.opacity);
       const F stopped = max(F(1.f - straight.probability), F(1e-6f));
       throughput = select<F>(clear, throughput * F(1.f / stopped), throughput);
     }
