@@ -234,7 +234,7 @@ class Integrator {
     const uint32_t material = material_of(hit);
     if ((scene_.materials.materials[material].flags & kTransmitsStraight) == 0) return Rgb(0.f);
     const MeshHit<F> on_mesh{hit.inst, mesh_of(hit), hit.prim, hit.u, hit.v, time_};
-    const auto cosine = [&](bool) { return straight_cosine<F>(at.s, ray.d); };
+    const auto cosine = [&](bool) { return unadjusted_cosine<F>(at.s.unadjusted, ray.d); };
     const StraightTransmission<F> t =
         straight_transmission<F>(scene_, on_mesh, material, cosine, true);
     at.params.opacity = t.opacity;

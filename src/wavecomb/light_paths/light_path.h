@@ -89,11 +89,13 @@ struct ConnectionTarget {
 /// out, but not the division by the probability with which traversal stops a ray.
 template <typename Bsdf, typename F, typename V, typename Interaction>
 WAVECOMB_INLINE Color<F> flux_at(const V& v, const Interaction& at, const Mask<F>& is_first) {
-  if constexpr (!Bsdf::kAbsorbs) return at.throughput;
-  Mask<F> unabsorbed = is_first;
-  if constexpr (Bsdf::kAbsorbs && Bsdf::kTransmitsStraight)
-    unabsorbed = is_first & not_(at.bsdf.is_clear());
-  return select<F>(unabsorbed, v.path.throughput, at.throughput);
+  if constexpr (!Bsdf::kAbsorbs) {
+    return at.throughput;
+  } else {
+    Mask<F> unabsorbed = is_first;
+    if constexpr (Bsdf::kTransmitsStraight) unabsorbed = is_first & not_(at.bsdf.is_clear());
+    return select<F>(unabsorbed, v.path.throughput, at.throughput);
+  }
 }
 
 }  // namespace wavecomb

@@ -222,14 +222,21 @@ WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F
   return s;
 }
 
-/// Returns |cos| of the angle between `dir` and Surface::unadjusted of the shading point that
-/// setup_surface() computes, but reads no more of the mesh than this needs.
+/// Returns |cos| of the angle between a ray along `dir` and the shading normal before its
+/// adjustment to the ray, which is the same for the opposite direction.
+template <typename F>
+inline F unadjusted_cosine(const Vec3<F>& unadjusted, const Vec3<F>& dir) {
+  return min(abs(dot(dir, unadjusted)), F(1.f));
+}
+
+/// Returns the cosine for the shading point that setup_surface() computes, but reads no more of the
+/// mesh than the normal needs.
 template <typename F>
 inline F unadjusted_cosine(const SceneView& scene, const MeshHit<F>& hit, const Vec3<F>& dir,
                            const Mask<F>& lanes) {
-  const auto cosine = [&](const Vec3<F>& n) { return min(abs(dot(dir, n)), F(1.f)); };
   if (scene.has_motion || (scene.has_curves && any(detail::is_curved<F>(scene, hit.mesh, lanes))))
-    return cosine(setup_surface<F>(scene, hit, dir, false, false, lanes).unadjusted);
+    return unadjusted_cosine<F>(setup_surface<F>(scene, hit, dir, false, false, lanes).unadjusted,
+                                dir);
   const detail::MeshReader<F> mesh(scene.meshes, hit.mesh, lanes);
   const detail::InstanceMaps<F> maps(scene.instances, hit.inst, lanes);
   const auto corners = mesh.corners(hit.prim, lanes);
@@ -253,7 +260,7 @@ inline F unadjusted_cosine(const SceneView& scene, const MeshHit<F>& hit, const 
     n = select<F>(len2 > 0.f, n, dir);
     len2 = select(len2 > 0.f, len2, F(1.f));
   }
-  return cosine(n * F(1.f / sqrt(len2)));
+  return unadjusted_cosine<F>(n * F(1.f / sqrt(len2)), dir);
 }
 
 /// Returns the origin of a ray that leaves `s` along `dir`, offset from the surface on that side,

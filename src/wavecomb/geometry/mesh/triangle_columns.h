@@ -12,8 +12,8 @@
 
 namespace wavecomb {
 
-/// Faces through which a line leaves a mesh minus the faces through which it enters: 1 inside a
-/// closed mesh that faces outwards, and 0 outside.
+/// Number of faces through which a line leaves a mesh minus the number through which it enters: 1
+/// for a point inside a closed mesh that faces outwards, and 0 for a point outside.
 struct FacesLeft {
   int ahead = 0;   ///< on the half of the line ahead of the point
   int behind = 0;  ///< on the other half, in the opposite direction

@@ -161,8 +161,8 @@ struct MaterialView {
   /// Records of program-specific parameters, indexed by material; null if no material has any.
   const ProgramParameterRecord* own = nullptr;
   const float* energy = nullptr;  ///< energy tables (EnergyTables), if a material needs them
-  /// By material, the index of its table in `straight_tables`, or kNoStraightTable; null if no
-  /// material has a table (lobes/straight_transmission.h).
+  /// Index of each material's table in `straight_tables`, or kNoStraightTable; null if no material
+  /// has a table of straight transmission (lobes/straight_transmission.h).
   const uint32_t* straight_table = nullptr;
   const float* straight_tables = nullptr;
   GraphView graphs{};

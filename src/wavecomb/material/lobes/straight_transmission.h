@@ -93,13 +93,6 @@ inline StraightTable preview_surface_table(const MaterialView& view, uint32_t ma
 /// are 0 if the wall is rough.
 StraightTable wall_table(MaterialView view, uint32_t material, const Material& m);
 
-/// Returns the cosine on which straight transmission along `dir` depends. It is the same for the
-/// opposite direction.
-template <typename F>
-inline F straight_cosine(const Surface<F>& s, const Vec3<F>& dir) {
-  return min(abs(dot(dir, s.unadjusted)), F(1.f));
-}
-
 namespace detail {
 
 /// Evaluates straight_transmission() for materials without a table.
@@ -125,7 +118,7 @@ template <typename F, typename MakeCosine>
 
 }  // namespace detail
 
-/// Returns the straight transmission at a hit. `make_cosine(lanes)` returns straight_cosine() and
+/// Returns the straight transmission at a hit. `make_cosine(lanes)` returns unadjusted_cosine() and
 /// is called only if a lane has an opacity below 1. The active lanes must have materials with the
 /// flag kTransmitsStraight.
 template <typename F, typename MakeCosine>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Straight transmission of thin walls of OpenPBR, apart from sources of the core that do not
-/// depend on the program.
+/// Table of the straight transmission of thin walls of OpenPBR, in a separate source file, so
+/// that an edit of the program recompiles no other source besides its kernels.
 #include <algorithm>
 #include <cmath>
 
@@ -14,7 +14,7 @@ StraightTable wall_table(MaterialView view, uint32_t material, const Material& m
   const auto no_graph = [](bool) { return GraphPoint<float>(); };
   const OpenPbrBsdf<float, kAllParts> wall(
       OpenPbrParams<float>::fetch<0, false>(view, material, {0, 0}, 0.f, no_graph, true), false);
-  const float most = m.emits() ? kMaxEmissivePassing : 1.f;
+  const float most = most_passing<float>(view.materials[material].flags);
   return make_straight_table([&](float z) {
     const Vec3<float> wo(std::sqrt(std::max(1 - z * z, 0.f)), 0, z);
     const Color<float> passed = wall.straight(wall.view(wo));

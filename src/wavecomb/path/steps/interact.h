@@ -151,7 +151,9 @@ WAVECOMB_INLINE MaterialLookup<Bsdf, F> look_up_material(const Vertex<F, kFeatur
   if constexpr (Bsdf::kTransmitsStraight) {
     const Mask<F> clear = v.active & transmits_straight<F>(params.flags);
     if (any(clear)) {
-      const auto cosine = [&](const Mask<F>& /*lanes*/) { return straight_cosine<F>(s, path.dir); };
+      const auto cosine = [&](const Mask<F>& /*lanes*/) {
+        return unadjusted_cosine<F>(s.unadjusted, path.dir);
+      };
       const StraightTransmission<F> straight =
           straight_transmission<F>(v.scene, v.hit, v.material, cosine, clear);
       params.opacity = select(clear, straight.opacity, params.opacity);
