@@ -18,23 +18,61 @@ _core = pytest.importorskip("wavecomb._core")
 ENOUGH = {"width": 160, "height": 160, "spp": 128}
 """Just enough samples for all pilot renders."""
 PART = {**ENOUGH, "region": (60, 100, 76, 116), "crop": True}
+WIDER = {"region": (50, 100, 76, 120)}
+"""A region that contains that of ``PART``; ``inner`` returns the pixels of ``PART``."""
+OTHER_SCHEDULE = {"threads": 1, "wave_size": 100, "policy": "material", "lanes": 1}
+FEW = 4
+"""Samples of images that need no pilot renders, since the decision is given. All renders with light
+paths trace light paths for the whole image, so that renders with all samples take seconds."""
+
+
+def scene_of(name: str, folder: Path) -> Any:
+    write_scene(name, folder / f"{name}.usdc")
+    return wavecomb.load(folder / f"{name}.usdc").scene
 
 
 @pytest.fixture(scope="module")
 def caustics(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    path = tmp_path_factory.mktemp("quality") / "caustics.usdc"
-    write_scene("caustics", path)
-    return wavecomb.load(path).scene
+    return scene_of("caustics", tmp_path_factory.mktemp("quality"))
+
+
+@pytest.fixture(scope="module")
+def prism(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """A scene with caustics behind glass, which merging finds."""
+    return scene_of("prism", tmp_path_factory.mktemp("quality"))
 
 
 def render(scene: Any, **settings: Any) -> Any:
     return _core.render(scene, _core.Settings(**{**PART, **settings}))
 
 
+def decide(scene: Any, **settings: Any) -> Any:
+    """Stops a render soon after its pilot renders; its result holds the decision only."""
+    settings = {**PART, **settings}
+    return _core.render(scene, _core.Settings(**settings), watcher=StopAt(1), interval=0.001)
+
+
+def render_few(scene: Any, learned: bytes, **settings: Any) -> Any:
+    """Renders few samples according to the decision of an earlier render."""
+    settings = {**PART, "spp": FEW, **settings}
+    return _core.render(scene, _core.Settings(**settings), learned=learned)
+
+
+def inner(wider: Any) -> Any:
+    """Returns the pixels of ``PART`` of a render of the region ``WIDER``."""
+    return wider.beauty[:16, 10:26]
+
+
 @pytest.fixture(scope="module")
-def default(caustics: Any) -> Any:
+def decided(caustics: Any) -> Any:
+    """Result with the decision for the default settings."""
+    return decide(caustics)
+
+
+@pytest.fixture(scope="module")
+def default(prism: Any) -> Any:
     """Renders a part of an image with default settings."""
-    return render(caustics)
+    return render(prism)
 
 
 def test_the_defaults_leave_the_decision_to_pilots() -> None:
@@ -45,13 +83,19 @@ def test_the_defaults_leave_the_decision_to_pilots() -> None:
 
 
 @pytest.mark.slow
-def test_the_defaults_use_light_paths_for_caustics(caustics: Any, default: Any) -> None:
-    choice = default.stats["transport"]
+def test_the_defaults_use_light_paths_for_caustics(caustics: Any, decided: Any) -> None:
+    choice = decided.stats["transport"]
     assert choice["chosen"] == "light" and choice["gain"] > 1.3
-    seconds = default.stats["seconds"]
+    assert decided.stats["guiding"] is None
+    image = render_few(caustics, decided.learned).beauty
+    assert not np.array_equal(image, render(caustics, quality="plain", spp=FEW).beauty)
+
+
+@pytest.mark.slow
+def test_times_include_pilots(default: Any) -> None:
+    choice, seconds = default.stats["transport"], default.stats["seconds"]
+    assert choice["chosen"] == "light" and default.stats["guiding"] is None
     assert 0 < choice["seconds"] < seconds["first_samples"] < seconds["render"]
-    assert default.stats["guiding"] is None
-    assert not np.array_equal(default.beauty, render(caustics, quality="plain").beauty)
 
 
 def test_plain_is_what_is_left_without_both(caustics: Any) -> None:
@@ -72,36 +116,48 @@ def test_each_part_can_be_forced(caustics: Any, quality: str) -> None:
     assert quality == "plain" or "guiding" in guided.stats["transport"]["why"]
 
 
-@pytest.mark.slow
-def test_all_parts_and_schedules_decide_alike(caustics: Any, default: Any) -> None:
-    for way in ({"threads": 1, "wave_size": 100, "policy": "material"}, {"lanes": 1, "threads": 2}):
-        other = render(caustics, **way)
-        assert other.stats["transport"]["gain"] == default.stats["transport"]["gain"], way
-        assert np.array_equal(other.beauty, default.beauty), way
-    wider = render(caustics, region=(50, 100, 76, 120))
-    assert np.array_equal(wider.beauty[:16, 10:26], default.beauty)
+def check_parts_and_schedules(scene: Any, decided: Any) -> None:
+    """Asserts that a region and another schedule change neither the decision nor the image."""
+    image = render_few(scene, decided.learned)
+    assert image.stats["transport"]["why"] == "by an earlier render"
+    for way in (OTHER_SCHEDULE, {"threads": 2}, WIDER):
+        other = decide(scene, **way)
+        assert other.stats["transport"]["gain"] == decided.stats["transport"]["gain"], way
+        assert other.learned == decided.learned, way
+        few = render_few(scene, other.learned, **way)
+        assert few.stats["transport"]["chosen"] == "light", way
+        assert np.array_equal(inner(few) if way is WIDER else few.beauty, image.beauty), way
 
 
 @pytest.mark.slow
-def test_a_decision_is_handed_on(caustics: Any, default: Any) -> None:
-    """A decision that is given, or that the renderer has stored, replaces pilot renders."""
-    settings = _core.Settings(**PART)
-    again = _core.render(caustics, settings, learned=default.learned)
+def test_all_parts_and_schedules_decide_alike(caustics: Any, decided: Any) -> None:
+    check_parts_and_schedules(caustics, decided)
+
+
+@pytest.mark.slow
+def test_a_decision_is_handed_on(prism: Any, default: Any) -> None:
+    """A decision that is given replaces pilot renders and gives the same image."""
+    again = _core.render(prism, _core.Settings(**PART), learned=default.learned)
     assert again.stats["transport"]["why"] == "by an earlier render"
     assert again.stats["transport"]["gain"] == default.stats["transport"]["gain"]
     assert np.array_equal(again.beauty, default.beauty)
-    renderer = _core.Renderer(caustics)
-    first = renderer.render(settings)
-    second = renderer.render(_core.Settings(**{**PART, "region": (50, 100, 76, 120)}))
-    assert first.stats["transport"]["seconds"] > 0 == second.stats["transport"]["seconds"]
-    assert np.array_equal(second.beauty[:16, 10:26], default.beauty)
 
 
 @pytest.mark.slow
-def test_a_resumed_render_keeps_its_decision(caustics: Any, default: Any) -> None:
+def test_a_renderer_stores_its_decision(prism: Any, default: Any) -> None:
+    """Another part of the image is rendered without pilot renders."""
+    renderer = _core.Renderer(prism)
+    first = renderer.render(_core.Settings(**PART), watcher=StopAt(1), interval=0.001)
+    second = renderer.render(_core.Settings(**{**PART, **WIDER}))
+    assert first.stats["transport"]["seconds"] > 0 == second.stats["transport"]["seconds"]
+    assert np.array_equal(inner(second), default.beauty)
+
+
+@pytest.mark.slow
+def test_a_resumed_render_keeps_its_decision(prism: Any, default: Any) -> None:
     stop = StopAt(1)
-    _core.render(caustics, _core.Settings(**PART), watcher=stop, interval=0.001)
-    again = _core.render(caustics, _core.Settings(**PART, threads=1), state=stop.state)
+    _core.render(prism, _core.Settings(**PART), watcher=stop, interval=0.001)
+    again = _core.render(prism, _core.Settings(**PART, **OTHER_SCHEDULE), state=stop.state)
     assert again.stats["transport"]["why"] == "by an earlier render"
     assert np.array_equal(again.beauty, default.beauty)
 
@@ -136,33 +192,21 @@ def test_late_pilots_give_up(caustics: Any) -> None:
 @pytest.mark.slow
 def test_a_room_is_guided_if_paths_start_at_the_camera(plain_room: Path) -> None:
     scene = wavecomb.load(plain_room).scene
-    stats = render(scene, spp=256, region=(0, 0, 4, 4), transport="path").stats
+    stats = decide(scene, region=(0, 0, 4, 4), transport="path").stats
     assert stats["guiding"]["used"] and stats["guiding"]["gain"] >= 1.25
 
 
 @pytest.mark.slow
-def test_merging_is_decided_alike_for_all_parts_and_schedules(tmp_path: Path) -> None:
-    """The prism has caustics behind glass, which merging finds."""
-    path = tmp_path / "prism.usdc"
-    write_scene("prism", path)
-    prism = wavecomb.load(path).scene
-    first = render(prism)
-    choice = first.stats["transport"]
+def test_merging_is_decided_alike_for_all_parts_and_schedules(prism: Any, default: Any) -> None:
+    choice = default.stats["transport"]
     assert (choice["chosen"], choice["merges"], choice["light_paths"]) == ("light", True, 1)
-    for way in ({"threads": 1, "wave_size": 100, "policy": "material"}, {"lanes": 1}):
-        assert np.array_equal(render(prism, **way).beauty, first.beauty), way
-    wider = render(prism, region=(50, 100, 76, 120))
-    assert np.array_equal(wider.beauty[:16, 10:26], first.beauty)
-    again = _core.render(prism, _core.Settings(**PART), learned=first.learned)
-    assert np.array_equal(again.beauty, first.beauty)
-    stop = StopAt(1)
-    _core.render(prism, _core.Settings(**PART), watcher=stop, interval=0.001)
-    resumed = _core.render(prism, _core.Settings(**PART), state=stop.state)
-    assert np.array_equal(resumed.beauty, first.beauty)
-    unmerged = render(prism, auto_merge="off")
+    check_parts_and_schedules(prism, default)
+    unmerged = decide(prism, auto_merge="off")
     assert not unmerged.stats["transport"]["merges"]
-    assert not np.array_equal(unmerged.beauty, first.beauty)
+    image = render_few(prism, default.learned).beauty
+    without = render_few(prism, unmerged.learned, auto_merge="off").beauty
+    assert not np.array_equal(without, image)
     # Merging does not go with errors of pixels, and light paths are used without merging.
     for way in ({"noise": 0.05}, {"aovs": ("direct",)}):
-        other = render(prism, **way).stats["transport"]
+        other = decide(prism, **way).stats["transport"]
         assert (other["chosen"], other["merges"]) == ("light", False), way
