@@ -28,9 +28,23 @@ def test_cases_come_from_their_numbers_alone(tmp_path: Path) -> None:
         assert texts[0] != texts[2] or kind == "deep", kind
 
 
+MENDED = (
+    "checkpoint/3", "merge/16", "costs/49", "usdc splice/79", "usdc counts/135", "usdc types/142",
+    "usda words/148", "usda words/150", *(("vdb/13",) if "vdb" in KINDS else ()),
+)  # fmt: skip
+"""Cases that once failed."""
+
+
+@pytest.fixture(scope="module")
+def verdicts() -> list[Verdict]:
+    """Results of a case of each kind, and then of ``MENDED``, run in one batch."""
+    cases = [case.split("/") for case in MENDED]
+    return run([*plan(len(KINDS)), *((kind, int(number)) for kind, number in cases)], seed=1)
+
+
 @pytest.mark.slow
-def test_broken_stages_end_in_a_line() -> None:
-    verdicts = run(plan(len(KINDS)), seed=1)
+def test_broken_stages_end_in_a_line(verdicts: list[Verdict]) -> None:
+    verdicts = verdicts[: len(KINDS)]
     faults = [f"{v.name}: {v.outcome} {v.said}" for v in verdicts if v.outcome not in GOOD]
     assert not faults
     assert {v.kind for v in verdicts} == set(KINDS)
@@ -40,24 +54,11 @@ def test_broken_stages_end_in_a_line() -> None:
     assert all(v.said for v in verdicts if v.outcome != "rendered")
 
 
-MENDED = (
-    "checkpoint/3", "merge/16", "costs/49", "usdc splice/79", "usdc counts/135", "usdc types/142",
-    "usda words/148", "usda words/150", *(("vdb/13",) if "vdb" in KINDS else ()),
-)  # fmt: skip
-
-
-@pytest.fixture(scope="module")
-def mended() -> dict[str, Verdict]:
-    """Results of cases that once failed, run in one batch."""
-    cases = [case.split("/") for case in MENDED]
-    verdicts = run([(kind, int(number)) for kind, number in cases], seed=1)
-    return {verdict.name: verdict for verdict in verdicts}
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("case", MENDED)
-def test_what_was_found_and_mended(case: str, mended: dict[str, Verdict]) -> None:
-    assert mended[case].outcome in GOOD, mended[case].said
+def test_what_was_found_and_mended(case: str, verdicts: list[Verdict]) -> None:
+    (verdict,) = (v for v in verdicts[len(KINDS) :] if v.name == case)
+    assert verdict.outcome in GOOD, verdict.said
 
 
 def test_table() -> None:
