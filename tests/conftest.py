@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 import compileall
+import functools
 import os
 import signal
 import subprocess
 import sys
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -76,6 +77,32 @@ def plain_room(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("plain_room") / "room.usdc"
     write_scene("room", path, plain=True, triangles=12_000, teapot_level=4, texture_size=64)
     return path
+
+
+@pytest.fixture(scope="session", autouse=True)
+def shared_dragons() -> Iterator[None]:
+    """Compute small dragons of generated scenes once, which takes a second of CPU time for each.
+
+    The arrays of a shared mesh are read-only. ``options.dragon.cache_clear()`` forgets the meshes.
+    """
+    try:
+        from wavecomb.scenes import options
+        from wavecomb.scenes.models.mesh import Mesh
+    except ImportError:
+        yield
+        return
+    make = options.dragon
+
+    @functools.lru_cache(maxsize=4)
+    def shared(triangles: int) -> Mesh:
+        mesh = make(triangles)
+        for array in vars(mesh).values():
+            array.flags.writeable = False
+        return mesh
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(options, "dragon", shared)
+        yield
 
 
 @pytest.fixture
