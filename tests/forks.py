@@ -21,7 +21,7 @@ import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -129,7 +129,7 @@ class Popen(_Popen):
         words = [] if isinstance(args, (str, bytes)) else [str(word) for word in args]
         request = {"words": words[1:], "env": variables, "cwd": os.fspath(cwd or os.getcwd()),
                    "numbers": [0, 1, 2, *pass_fds], "session": bool(session)}  # fmt: skip
-        plain = not (preexec_fn or shell or executable or any(more[1:4]) or more[6:] > (-1,))
+        plain = _is_plain(preexec_fn, shell, executable, more)
         server = _started() if plain and _is_python(words) else None
         if server is None or not server.serves(variables) or len(json.dumps(request)) > _MOST:
             super()._execute_child(
@@ -170,6 +170,11 @@ class Popen(_Popen):
                 if pid:
                     self._handle_exitstatus(status)
         return self.returncode
+
+
+def _is_plain(preexec_fn: Any, shell: Any, executable: Any, more: Sequence[Any]) -> bool:
+    """Whether a fork can have the effect of these arguments of ``Popen._execute_child``."""
+    return not (preexec_fn or shell or executable or any(more[1:4]) or more[6:] > (-1,))
 
 
 def _is_python(words: Sequence[str]) -> bool:
@@ -257,6 +262,80 @@ def _fork(request: Mapping[str, Any], descriptors: Sequence[int]) -> None:
         os.setsid()
 
 
+class _PlanPopen(_Popen):
+    """A `subprocess.Popen` in forked processes, which forks again to plan jobs of a farm.
+
+    A process that has threads cannot fork, and starts the planning process as usual.
+    """
+
+    def _execute_child(
+        self, args: Any, executable: Any, preexec_fn: Any, close_fds: Any, pass_fds: Any,
+        cwd: Any, env: Any, startupinfo: Any, creationflags: Any, shell: Any,
+        p2cread: int, p2cwrite: int, c2pread: int, c2pwrite: int, errread: int, errwrite: int,
+        *more: Any,
+    ) -> None:  # fmt: skip
+        words = [] if isinstance(args, (str, bytes)) else [str(word) for word in args]
+        plans = _is_python(words) and words[1] == "-I" and words[-4:-1] == _PLAN
+        plain = _is_plain(preexec_fn, shell, executable, more) and env is None and cwd is None
+        if not (plans and plain) or len(os.listdir("/proc/self/task")) > 1:
+            super()._execute_child(
+                args, executable, preexec_fn, close_fds, pass_fds, cwd, env, startupinfo,
+                creationflags, shell, p2cread, p2cwrite, c2pread, c2pwrite, errread, errwrite,
+                *more,
+            )  # fmt: skip
+            return
+        for stream in (sys.stdout, sys.stderr):
+            stream.flush()
+        self.pid = os.fork()
+        if self.pid == 0:
+            try:
+                _plan(words[3:], (p2cread, c2pwrite, errwrite), bool(more[5]))
+            finally:
+                os._exit(70)
+        self._child_created = True
+        given, own = (p2cread, c2pwrite, errwrite), (p2cwrite, c2pread, errread)
+        shut = {end for end, mine in zip(given, own, strict=True) if end != -1 and mine != -1}
+        for end in shut | ({getattr(self, "_devnull", None)} - {None}):
+            os.close(end)
+
+
+_PLAN = ["wavecomb", "farm", "plan"]
+
+
+def _plan(words: Sequence[str], streams: Sequence[int], session: bool) -> None:
+    """Run ``wavecomb.boot`` in a process that `_PlanPopen` forked, and end the process."""
+    import signal
+
+    from wavecomb import boot
+
+    atexit._clear()
+    for number in signal.valid_signals():
+        if callable(signal.getsignal(number)):
+            default = signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL
+            signal.signal(number, default)
+    for number, end in enumerate(streams):
+        if end != -1:
+            os.dup2(end, number)
+    for name, number in (("stdout", 1), ("stderr", 2)):
+        setattr(sys, name, open(number, "w", encoding="utf-8", closefd=False))  # noqa: SIM115
+    if session:
+        os.setsid()
+    _run(lambda: boot.main(words))
+
+
+def _run(work: Callable[[], object]) -> None:
+    """Call a function and end the process like Python."""
+    code: object = 0
+    try:
+        work()
+    except SystemExit as end:
+        code = end.code
+    except BaseException:
+        sys.excepthook(*sys.exc_info())  # type: ignore[arg-type]
+        code = 1
+    _end(code)
+
+
 def _end(code: object) -> None:
     """End this process like Python, but skip the teardown of modules, which takes long."""
     if code is not None and not isinstance(code, int):
@@ -280,7 +359,6 @@ def _main(descriptor: int) -> None:
     if mine:
         del os.environ["OPENBLAS_NUM_THREADS"]
     import gc
-    import runpy
 
     gc.collect()
     gc.freeze()
@@ -295,25 +373,25 @@ def _main(descriptor: int) -> None:
     sys.argv[:] = [way, *rest]
     if way != "-I":
         sys.path.insert(0, "" if way == "-c" else request["cwd"])
-    code: object = 0
-    try:
-        if way == "-I":
-            from wavecomb import boot
+    subprocess.Popen = _PlanPopen  # type: ignore[misc]
+    _run(lambda: _do(way, what, rest))
 
-            alive = f"--parent={os.getppid()}"
-            boot.main([alive if one.startswith("--parent=") else one for one in rest])
-        elif way == "-m":
-            runpy.run_module(what, run_name="__main__", alter_sys=True)
-        else:
-            module = type(sys)("__main__")
-            sys.modules["__main__"] = module
-            exec(compile(what, "<string>", "exec"), module.__dict__)
-    except SystemExit as end:
-        code = end.code
-    except BaseException:
-        sys.excepthook(*sys.exc_info())  # type: ignore[arg-type]
-        code = 1
-    _end(code)
+
+def _do(way: str, what: str, rest: Sequence[str]) -> None:
+    """Run the Python code or module of a request."""
+    import runpy
+
+    if way == "-I":
+        from wavecomb import boot
+
+        alive = f"--parent={os.getppid()}"
+        boot.main([alive if one.startswith("--parent=") else one for one in rest])
+    elif way == "-m":
+        runpy.run_module(what, run_name="__main__", alter_sys=True)
+    else:
+        module = type(sys)("__main__")
+        sys.modules["__main__"] = module
+        exec(compile(what, "<string>", "exec"), module.__dict__)
 
 
 if __name__ == "__main__":

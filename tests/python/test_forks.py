@@ -57,7 +57,15 @@ def test_code(end: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("words", [["--version"], ["nonsense"], ["info", "none.usda"]])
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--version"],
+        ["nonsense"],
+        ["info", "none.usda"],
+        ["farm", "submit", "none.usda", "-o", "a.exr"],
+    ],
+)
 def test_commands(words: list[str], tmp_path: Path) -> None:
     fresh, forked = both(["-m", "wavecomb", *words], cwd=tmp_path)
     assert forked == fresh
