@@ -13,10 +13,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import forks
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from parts import not_here
+from parts import is_long, not_here
 
 from wavecomb.bench import jobs, machine
 from wavecomb.bench import process as workers
@@ -266,9 +267,12 @@ def test_estimates_follow_what_was_measured() -> None:
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Results of the complete tiny suite."""
+    """Results of the complete tiny suite. In `make test`, its processes are forked."""
     folder = tmp_path_factory.mktemp("bench")
-    result = bench("run", written(folder, TINY), "-o", folder / "out")
+    with pytest.MonkeyPatch.context() as patch:
+        if not is_long():
+            patch.setattr(subprocess, "Popen", forks.Popen)
+        result = bench("run", written(folder, TINY), "-o", folder / "out")
     assert result.exit_code == 0, result.stderr
     assert "4/4 order.box.policy-" in result.stderr
     return folder / "out"
