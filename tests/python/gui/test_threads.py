@@ -3,6 +3,7 @@
 
 import gc
 import os
+import re
 import subprocess
 import sys
 import threading
@@ -59,22 +60,33 @@ class Saved:
         return [f"{type(one).__name__} {one!r:.80}" for one in owned(gc.garbage)]
 
 
+ALONE = []
+"""Names of the tests that run in a separate process."""
+
+
+@pytest.fixture(scope="module")
+def lonely():
+    """Runs the tests of ``ALONE`` in one separate process; returns their outcomes by name."""
+    done = subprocess.run(
+        [sys.executable, "-X", "faulthandler", "-m", "pytest", "-v", "-p", "no:xdist",
+         "-p", "no:cacheprovider", *(f"{__file__}::{name}" for name in ALONE)],
+        capture_output=True, text=True, check=False, env={**os.environ, "WAVECOMB_ALONE": "1"},
+    )  # fmt: skip
+    return done, dict(re.findall(r"::(\w+) (PASSED|FAILED|ERROR|SKIPPED)", done.stdout))
+
+
 def alone(test):
-    """Runs a test in a separate process, without garbage of other tests.
+    """Runs a test in a separate process, without garbage of tests other than those of ``ALONE``.
 
     Tests create Qt objects without a window, and PySide may crash when such objects are collected.
     """
     if os.environ.get("WAVECOMB_ALONE"):
         return test
+    ALONE.append(test.__name__)
 
-    def run():
-        done = subprocess.run(
-            [sys.executable, "-X", "faulthandler", "-m", "pytest", "-q", "-p", "no:xdist",
-             "-p", "no:cacheprovider", f"{__file__}::{test.__name__}"],
-            capture_output=True, text=True, check=False, env={**os.environ, "WAVECOMB_ALONE": "1"},
-        )  # fmt: skip
-        assert done.returncode == 0, done.stdout + done.stderr
-        assert "1 passed" in done.stdout
+    def run(lonely):
+        done, outcomes = lonely
+        assert outcomes.get(test.__name__) == "PASSED", done.stdout + done.stderr
 
     run.__name__, run.__doc__ = test.__name__, test.__doc__
     return run
