@@ -71,13 +71,11 @@ def test_one_picture_whatever_the_schedule(
         assert (learned["guided_share"] > 0) == (way["guiding"] == "on")
         assert not np.array_equal(plain.beauty, render(scene).beauty)
     others: list[dict[str, Any]] = [
-        {"lanes": 1, "threads": 1},
-        {"wave_size": 64, "threads": 2},
+        {"lanes": 1, "threads": 1, "traversal": "single", "progressive": True},
+        {"wave_size": 64, "threads": 2, "aovs": ("all",)},
         {"policy": "random-runs", "wave_size": 1000},
         {"policy": "material", "costs": "model", "ray_order": "morton", "materialize": "on"},
         {"integrator": "reference"},
-        {"traversal": "single", "progressive": True},
-        {"aovs": ("all",)},
     ]
     for other in others:
         same = render(scene, **way, **other)
@@ -97,7 +95,7 @@ def test_roulette_learns_beside_light_paths(cornell: Any, transport: dict[str, A
     way = {"roulette": "efficient", **transport}
     plain = render(cornell, **way)
     assert plain.stats["guiding"]["paths"] >= 12000
-    for other in ({"lanes": 1, "threads": 1}, {"integrator": "reference"}, {"wave_size": 64}):
+    for other in ({"lanes": 1, "threads": 1, "wave_size": 64}, {"integrator": "reference"}):
         assert np.array_equal(plain.beauty, render(cornell, **way, **other).beauty), other
     without = render(cornell, **transport, roulette="off")
     assert plain.beauty.mean() == pytest.approx(without.beauty.mean(), rel=0.01)
