@@ -423,6 +423,9 @@ def test_type_checkers_find_misspelt_keywords(tmp_path: Path) -> None:
 @REAL
 @pytest.mark.parametrize("name", ["edit_and_render.py", "no_usd.py", "stage_in_memory.py"])
 def test_the_examples_run(name: str, tmp_path: Path) -> None:
-    program = ROOT / "examples" / name
+    text, count = re.subn(r"spp=\d+", "spp=1", (ROOT / "examples" / name).read_text("utf-8"))
+    assert count > 0, "a single sample suffices here"
+    program = tmp_path / name
+    program.write_text(text, "utf-8")
     subprocess.run([sys.executable, str(program)], cwd=tmp_path, check=True)
     assert any(file.suffix == ".png" for file in tmp_path.iterdir())
