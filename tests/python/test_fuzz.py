@@ -13,6 +13,7 @@ pytest.importorskip("wavecomb._core")
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("forked")
 def test_cases_come_from_their_numbers_alone(tmp_path: Path) -> None:
     for kind in KINDS:
         folders = [tmp_path / f"{kind}-{turn}" for turn in range(3)]
