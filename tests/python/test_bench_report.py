@@ -214,30 +214,37 @@ def test_pictures_that_must_be_equal_and_are_not(tmp_path: Path) -> None:
     assert "mixed, roulette throughput, 16 spp, seed 1: 2 different pictures" in text
 
 
-@pytest.mark.slow
-def test_one_run_makes_a_report(tmp_path: Path) -> None:
-    rows = runs_of({"policy": ["none", "material"]}, lambda policy: 1.0, repetitions=1)
-    rows.append({**rows[0], "run_id": "x", "status": "failed", "error": "no <memory> left"})
-    text = build(write_folder(tmp_path / "r", rows)).read_text(encoding="utf-8")
-    check_sound(html5lib.HTMLParser(strict=True).parse(text))
-    assert "Some configurations ran only once" in text
-    assert "no &lt;memory&gt; left" in text
+EVIL = "<b>|x<i> & 'y' \"z\""
+"""Name of a stage and of an experiment with markup of HTML and Markdown."""
 
 
-@pytest.mark.slow
-def test_text_of_results_cannot_be_markup(tmp_path: Path) -> None:
-    """Names and messages from result files never become HTML or table cells."""
+@pytest.fixture(scope="module")
+def one_run(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, str]:
+    """HTML and Markdown report of one run of each policy, with names that contain markup."""
+    folder = tmp_path_factory.mktemp("one_run")
     rows = runs_of({"policy": ["none", "material"]}, lambda policy: 1.0, repetitions=1)
-    evil = "<b>|x<i> & 'y' \"z\""
     for row in rows:
-        row["stage"] = evil
-        row["experiment"] = evil
-    target = tmp_path / "page.md"
-    text = build(write_folder(tmp_path / "r", rows, pictures=True), target).read_text("utf-8")
-    html5lib.HTMLParser(strict=True).parse(text)
+        row["stage"] = row["experiment"] = EVIL
+    rows.append({**rows[0], "run_id": "x", "status": "failed", "error": "no <memory> left"})
+    target = folder / "page.md"
+    text = build(write_folder(folder / "r", rows, pictures=True), target).read_text("utf-8")
+    return text, target.read_text("utf-8")
+
+
+@pytest.mark.slow
+def test_one_run_makes_a_report(one_run: tuple[str, str]) -> None:
+    check_sound(html5lib.HTMLParser(strict=True).parse(one_run[0]))
+    assert "Some configurations ran only once" in one_run[0]
+    assert "no &lt;memory&gt; left" in one_run[0]
+
+
+@pytest.mark.slow
+def test_text_of_results_cannot_be_markup(one_run: tuple[str, str]) -> None:
+    """Names and messages from result files never become HTML or table cells."""
+    text, markdown = one_run
     assert "<b>" not in text and "&lt;b&gt;|x&lt;i&gt; &amp;" in text
-    assert "<b>" not in target.read_text("utf-8")
-    assert "| &lt;b>\\|x&lt;i> & 'y' \"z\" |" in target.read_text("utf-8")
+    assert "<b>" not in markdown
+    assert "| &lt;b>\\|x&lt;i> & 'y' \"z\" |" in markdown
 
 
 def test_parts() -> None:
