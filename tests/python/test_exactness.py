@@ -342,8 +342,7 @@ def test_every_pair_of_options(scene: str, scene_of: Any) -> None:
         expect_equal(render(scene_of(scene), (48, 32), 8, **settings), expected, row)
 
 
-# Wave sizes for several waves, and for one wave per thread; `make test-long` tests all wave sizes.
-SMALL = (16, 12), [256, 65536]
+SMALL = (16, 12), [256, 1024, 65536]
 LARGE = (32, 24), OPTIONS["wave_size"]
 
 
