@@ -151,11 +151,19 @@ inline Sample4<F> independent_4d(const SampleKey<F>& key, uint32_t set) {
 
 }  // namespace detail
 
-/// Returns the four sample values of a sample set for the path in each lane.
+/// Returns the four sample values of a sample set for the path in each lane, inlined.
 template <typename F>
-WAVECOMB_INLINE Sample4<F> sample_4d(SamplerKind kind, const SampleKey<F>& key, uint32_t set) {
+WAVECOMB_INLINE Sample4<F> inlined_sample_4d(SamplerKind kind, const SampleKey<F>& key,
+                                             uint32_t set) {
   return kind == SamplerKind::kSobol ? detail::sobol_4d<F>(key, set)
                                      : detail::independent_4d<F>(key, set);
+}
+
+/// Returns inlined_sample_4d(). Kernels call this function without inlining it
+/// (wave/kernels/shared_kernels.h).
+template <typename F>
+Sample4<F> sample_4d(SamplerKind kind, const SampleKey<F>& key, uint32_t set) {
+  return inlined_sample_4d<F>(kind, key, set);
 }
 
 /// Returns a value in [0, 1) for the decision `name` of a path. Over the samples of a pixel, the

@@ -375,14 +375,12 @@ WAVECOMB_INLINE LightVertexResult<F> light_path_steps(const Vertex<F, kFeatures>
     detail::connect<Bsdf, F>(v, path_point, target->row, out.v);
     return out;
   }
-  const Sample4<F> r_light =
-      sample_4d<F>(v.settings.sampler, v.key, vertex_set(VertexSet::kLight, v.depth));
+  const Sample4<F> r_light = v.sample(VertexSet::kLight);
   detail::connect_vertex_to_camera<Bsdf, F>(v, setup, path_point, r_light, out);
   if (setup.merger) [[unlikely]]
     detail::merge<Bsdf, F>(v, setup, path_point);
   if (v.depth + 1 >= v.settings.max_depth) return out;
-  const Sample4<F> r_bsdf =
-      sample_4d<F>(v.settings.sampler, v.key, vertex_set(VertexSet::kBsdf, v.depth));
+  const Sample4<F> r_bsdf = v.sample(VertexSet::kBsdf);
   detail::scatter_flux<Bsdf, F>(v, setup, path_point, r_bsdf, out);
   survive<F>(v, GuidingLookup<F>{}, max_component(path_point.flux), r_light.w, out.v);
   return out;

@@ -180,12 +180,23 @@ struct Vertex {
   const GuidingView* guide = nullptr;  ///< guiding field that is used for bounces or is in training
 
   static constexpr bool has(Feature feature) { return (kFeatures & feature) != 0; }
+  /// Whether the kernel inlines the drawing of samples and setup_surface(). General kernels call
+  /// shared functions instead, which makes them compile faster.
+  static constexpr bool kInlines = kFeatures == kPlain;
   /// Returns the AOV values to write, or null.
   VertexAovs<F>* recorded_aovs() const { return has(kRecordsAovs) ? aovs : nullptr; }
   bool wants_lights() const { return recorded_aovs() && aovs->wants_lights; }
   bool wants_events() const { return recorded_aovs() && aovs->wants_events; }
   bool wants_bounces() const { return recorded_aovs() && aovs->wants_bounces; }
   bool has_medium_stack() const { return has(kNestedMedia) && scene.nested_media.media; }
+  /// Returns the sample values of the set `name` at this vertex.
+  WAVECOMB_INLINE Sample4<F> sample(VertexSet name) const {
+    const uint32_t set = vertex_set(name, depth);
+    if constexpr (kInlines)
+      return inlined_sample_4d<F>(settings.sampler, key, set);
+    else
+      return sample_4d<F>(settings.sampler, key, set);
+  }
   bool has_links() const { return has(kLinks) && scene.lights.links.members; }
 };
 

@@ -67,8 +67,7 @@ WAVECOMB_INLINE VertexResult<F> vertex_steps(const Vertex<F, kFeatures>& v, Coup
   const GuidingLookup<F> guiding = guiding_lookup<Bsdf, F>(v, at, frame, wo);
   joint.template begin<Bsdf>(v, at, frame);
 
-  const Sample4<F> r_light =
-      sample_4d<F>(v.settings.sampler, v.key, vertex_set(VertexSet::kLight, v.depth));
+  const Sample4<F> r_light = v.sample(VertexSet::kLight);
   const LightReceiver<F> receiver = light_receiver<Bsdf, F>(v, frame, wo);
   const VertexContext<Bsdf, F, kFeatures, Coupling> context{.vertex = v,
                                                             .at = at,
@@ -80,8 +79,7 @@ WAVECOMB_INLINE VertexResult<F> vertex_steps(const Vertex<F, kFeatures>& v, Coup
                                                             .joint = joint};
   sample_light(context, r_light, out);
   joint.offer(context);
-  const Sample4<F> r_bsdf =
-      sample_4d<F>(v.settings.sampler, v.key, vertex_set(VertexSet::kBsdf, v.depth));
+  const Sample4<F> r_bsdf = v.sample(VertexSet::kBsdf);
   scatter(context, r_bsdf, out);
   survive<F>(v, guiding, luminance(at.throughput), r_light.w, out);
   if constexpr (Bsdf::kOnSurface && Bsdf::kTransmits)

@@ -139,26 +139,15 @@ WAVECOMB_INLINE void set_triangle_uv(const SceneView& scene, const MeshHit<F>& h
   s.dpdu = maps.vector(tangent);
 }
 
-}  // namespace detail
-
-/// Computes the shading point of a hit. `dir` is the unit direction of the ray. If `with_uv` is
-/// true, the members `uv`, `dpdu` and `uv_per_length` are computed. If `with_terminator` is true,
-/// the terminator vector is computed. `kWithCurves` may be false for scenes without curves, and
-/// `kWithMotion` for scenes without motion.
-///
-/// The member `offset` is an upper bound of the distance between `p` and the true surface. This
-/// distance is due to rounding errors of interpolation, transformation and traversal (Pharr, Jakob,
-/// Humphreys, "Physically Based Rendering", section 6.8). The terminator vector follows Hanika,
-/// "Hacking the Shadow Terminator", Ray Tracing Gems II.
-template <typename F, bool kWithCurves = true, bool kWithMotion = true>
-WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F>& hit,
-                                         const Vec3<F>& dir, bool with_uv, bool with_terminator,
-                                         const Mask<F>& lanes) {
+/// Computes setup_surface() for scenes that may have curves or motion as the arguments say.
+template <typename F, bool kWithCurves, bool kWithMotion>
+WAVECOMB_INLINE Surface<F> compute_surface(const SceneView& scene, const MeshHit<F>& hit,
+                                           const Vec3<F>& dir, bool with_uv, bool with_terminator,
+                                           const Mask<F>& lanes) {
   Mask<F> active = lanes;
-  if (kWithCurves && scene.has_curves)
-    active = active & not_(detail::is_curved<F>(scene, hit.mesh, lanes));
-  const detail::MeshReader<F> mesh(scene.meshes, hit.mesh, active);
-  detail::InstanceMaps<F> maps(scene.instances, hit.inst, active);
+  if (kWithCurves && scene.has_curves) active = active & not_(is_curved<F>(scene, hit.mesh, lanes));
+  const MeshReader<F> mesh(scene.meshes, hit.mesh, active);
+  InstanceMaps<F> maps(scene.instances, hit.inst, active);
   const auto [i0, i1, i2] = mesh.corners(hit.prim, active);
   Vec3<F> p0 = mesh.vec3(&MeshRecord::positions, i0, active);
   Vec3<F> p1 = mesh.vec3(&MeshRecord::positions, i1, active);
@@ -185,18 +174,18 @@ WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F
   const F safe_area2 = select(area2 > 0.f, area2, F(1.f));
   s.ng = select<F>(area2 > 0.f, area_vector * F(1.f / safe_area2), -dir);
 
-  const detail::TrianglePoint<F> at{.i = {i0, i1, i2},
-                                    .p0 = p0,
-                                    .p1 = p1,
-                                    .p2 = p2,
-                                    .e1 = e1,
-                                    .e2 = e2,
-                                    .p = p,
-                                    .b0 = b0,
-                                    .b1 = b1,
-                                    .b2 = b2,
-                                    .safe_area2 = safe_area2};
-  s.offset = detail::rounding_offset<F>(maps, at);
+  const TrianglePoint<F> at{.i = {i0, i1, i2},
+                            .p0 = p0,
+                            .p1 = p1,
+                            .p2 = p2,
+                            .e1 = e1,
+                            .e2 = e2,
+                            .p = p,
+                            .b0 = b0,
+                            .b1 = b1,
+                            .b2 = b2,
+                            .safe_area2 = safe_area2};
+  s.offset = rounding_offset<F>(maps, at);
   // Interpolation between motion steps adds rounding errors in proportion to the coordinates at
   // both steps.
   if (kWithMotion && scene.has_motion) [[unlikely]]
@@ -204,22 +193,47 @@ WAVECOMB_INLINE Surface<F> setup_surface(const SceneView& scene, const MeshHit<F
 
   s.ns = s.ng;
   s.terminator = Vec3<F>(F(0.f));
-  const Mask<F> smooth = detail::has_normals(mesh) & active;
+  const Mask<F> smooth = has_normals(mesh) & active;
   if (any(smooth))
-    detail::set_smooth_normal<kWithMotion, F>(scene, hit, mesh, maps, at, {smooth, with_terminator},
-                                              s);
+    set_smooth_normal<kWithMotion, F>(scene, hit, mesh, maps, at, {smooth, with_terminator}, s);
   s.uv = {b1, b2};
   s.dpdu = Vec3<F>(F(0.f));
   s.handedness = maps.side;
   s.uv_per_length = F(0.f);
-  if (with_uv) detail::set_triangle_uv<F>(scene, hit, mesh, maps, at, active, s);
+  if (with_uv) set_triangle_uv<F>(scene, hit, mesh, maps, at, active, s);
   if (kWithCurves && scene.has_curves) {
     const Mask<F> curved = lanes & not_(active);
-    if (any(curved)) detail::setup_curved<F>(scene, hit, dir, with_uv, curved, s);
+    if (any(curved)) setup_curved<F>(scene, hit, dir, with_uv, curved, s);
   }
   s.unadjusted = s.ns;
   s.ns = facing_normal<F>(dir, s.ng, s.ns);
   return s;
+}
+
+}  // namespace detail
+
+/// Computes the shading point of a hit. `dir` is the unit direction of the ray. If `with_uv` is
+/// true, the members `uv`, `dpdu` and `uv_per_length` are computed. If `with_terminator` is true,
+/// the terminator vector is computed.
+///
+/// The member `offset` is an upper bound of the distance between `p` and the true surface. This
+/// distance is due to rounding errors of interpolation, transformation and traversal (Pharr, Jakob,
+/// Humphreys, "Physically Based Rendering", section 6.8). The terminator vector follows Hanika,
+/// "Hacking the Shadow Terminator", Ray Tracing Gems II.
+///
+/// Kernels call this function without inlining it (wave/kernels/shared_kernels.h).
+template <typename F>
+Surface<F> setup_surface(const SceneView& scene, const MeshHit<F>& hit, const Vec3<F>& dir,
+                         bool with_uv, bool with_terminator, const Mask<F>& lanes) {
+  return detail::compute_surface<F, true, true>(scene, hit, dir, with_uv, with_terminator, lanes);
+}
+
+/// Returns setup_surface() for scenes without curves and motion, inlined.
+template <typename F>
+WAVECOMB_INLINE Surface<F> setup_plain_surface(const SceneView& scene, const MeshHit<F>& hit,
+                                               const Vec3<F>& dir, bool with_uv,
+                                               bool with_terminator, const Mask<F>& lanes) {
+  return detail::compute_surface<F, false, false>(scene, hit, dir, with_uv, with_terminator, lanes);
 }
 
 /// Returns |cos| of the angle between a ray along `dir` and the shading normal before its

@@ -114,6 +114,16 @@ WAVECOMB_INLINE UInt<F> textured_inputs_of(const Vertex<F, kFeatures>& v) {
                           v.active);
 }
 
+/// Returns the shading point of a vertex.
+template <typename Bsdf, typename F, uint32_t kFeatures>
+WAVECOMB_INLINE Surface<F> surface_of(const Vertex<F, kFeatures>& v, bool with_uv) {
+  if constexpr (Vertex<F, kFeatures>::kInlines)
+    return setup_plain_surface<F>(v.scene, v.hit, v.path.dir, with_uv, Bsdf::kHasTerminator,
+                                  v.active);
+  else
+    return setup_surface<F>(v.scene, v.hit, v.path.dir, with_uv, Bsdf::kHasTerminator, v.active);
+}
+
 /// Looks up the material and constructs the BSDF in one function, so that kernels do not store
 /// parameters that they never read.
 template <typename Bsdf, typename F, uint32_t kFeatures>
@@ -175,10 +185,8 @@ WAVECOMB_INLINE SurfaceHitPoint<Bsdf, F>::SurfaceHitPoint(const Vertex<F, kFeatu
       reads_texture(v.active & Mask<F>((textured_inputs & (kVertexInputs<Bsdf> | kReadsGraph)) !=
                                        UInt<F>(0u))),
       textured(Bsdf::kTextured && any(reads_texture)),
-      s(setup_surface<F, Vertex<F, kFeatures>::has(kCurves), Vertex<F, kFeatures>::has(kMotion)>(
-          v.scene, v.hit, v.path.dir,
-          textured || Bsdf::kOnFibre || (v.recorded_aovs() && v.aovs->wants_uv),
-          Bsdf::kHasTerminator, v.active)) {}
+      s(detail::surface_of<Bsdf, F>(
+          v, textured || Bsdf::kOnFibre || (v.recorded_aovs() && v.aovs->wants_uv))) {}
 
 template <typename Bsdf, typename F>
 template <uint32_t kFeatures>

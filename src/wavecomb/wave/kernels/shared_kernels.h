@@ -1,15 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-/// Functions that the kernels of all programs call without inlining: light sampling, guiding,
-/// textures, curves, motion and value graphs. shared.lanes.cpp compiles these functions once for
-/// each lane width and includes their bodies from the *.inl files.
+/// Functions that the kernels of all programs call without inlining: sampling, surfaces, lights,
+/// guiding, textures, motion, value graphs, AOVs and light path vertices. shared.lanes.cpp compiles
+/// these functions once for each lane width and includes their bodies from the *.inl files.
 #pragma once
 
+#include "wavecomb/aov/path_events.h"
+#include "wavecomb/core/sampler.h"
 #include "wavecomb/geometry/hit/surface.h"
 #include "wavecomb/graph/run.h"
 #include "wavecomb/guiding/lookup.h"
 #include "wavecomb/light/emission/emission.h"
+#include "wavecomb/light/filters/shadow.h"
 #include "wavecomb/light/sampling/light_sample.h"
+#include "wavecomb/light_paths/light_path_aovs.h"
+#include "wavecomb/light_paths/light_vertices.h"
 #include "wavecomb/material/inputs/graph_inputs.h"
+#include "wavecomb/material/params.h"
+#include "wavecomb/path/camera/camera_connection.h"
 #include "wavecomb/path/steps/emit.h"
 #include "wavecomb/texture/lookup.h"
 
@@ -62,4 +69,42 @@
       const SceneView&, const UInt<F>&, const UInt<F>&, const std::array<UInt<F>, 3>&, const F&,   \
       const detail::InstanceMaps<F>&, const Mask<F>&);                                             \
   KEYWORD template std::array<Vec3<F>, 3> moved_normals<F>(                                        \
-      const SceneView&, const UInt<F>&, const std::array<UInt<F>, 3>&, const F&, const Mask<F>&)
+      const SceneView&, const UInt<F>&, const std::array<UInt<F>, 3>&, const F&, const Mask<F>&);  \
+  KEYWORD template struct detail::MatrixPair<F>;                                                   \
+  KEYWORD template Sample4<F> sample_4d<F>(SamplerKind, const SampleKey<F>&, uint32_t);            \
+  KEYWORD template Surface<F> setup_surface<F>(const SceneView&, const MeshHit<F>&,                \
+                                               const Vec3<F>&, bool, bool, const Mask<F>&);        \
+  KEYWORD template Vec3<F> detail::smooth_tangent<F>(const SceneView&, const MeshHit<F>&,          \
+                                                     const std::array<UInt<F>, 3>&,                \
+                                                     const Vec3<F>&, const Mask<F>&);              \
+  KEYWORD template Vec2<F> hit_uv<F>(const MeshRecord*, const UInt<F>&, const UInt<F>&, const F&,  \
+                                     const F&, const Mask<F>&);                                    \
+  KEYWORD template void detail::drive_parameters<F, ShadingParams<F>>(                             \
+      const MaterialView&, const UInt<F>&, const GraphPoint<F>&, const Mask<F>&,                   \
+      ShadingParams<F>&);                                                                          \
+  KEYWORD template struct LightEffect<F>;                                                          \
+  KEYWORD template ShadowExtent<F> shadow_extent<F>(const LightView&, const UInt<F>&, const F&,    \
+                                                    const Mask<F>&);                               \
+  KEYWORD template CameraConnection<F> connect_to_camera<F>(                                       \
+      const CameraSetup&, const Vec3<F>&, const F&, const F&, const F&, const Mask<F>&);           \
+  KEYWORD template void PathAovs::vertex<F>(uint32_t, const UInt<F>&, const VertexAovs<F>&,        \
+                                            const PathState<F>&, const Mask<F>&) const;            \
+  KEYWORD template void PathAovs::light<Technique::kEmitter, F>(                                   \
+      const LightEvent<F>&, const UInt<F>&, const Mask<F>&) const;                                 \
+  KEYWORD template void PathExpressions::add<F>(const UInt<F>&, const UInt<F>&, const Color<F>&,   \
+                                                const Mask<F>&) const;                             \
+  KEYWORD template void PathExpressions::scatter<F>(uint32_t, const UInt<F>&, const SampleKey<F>&, \
+                                                    const VertexAovs<F>&, const Mask<F>&,          \
+                                                    const Mask<F>&) const;                         \
+  KEYWORD template void PathHistory::vertex<F>(uint32_t, const UInt<F>&, const ShadedVertex<F>&,   \
+                                               const float*, const Mask<F>&);                      \
+  KEYWORD template void LightPathAovs::shade<F>(uint32_t, const UInt<F>&, const SampleKey<F>&,     \
+                                                const VertexAovs<F>&, const Mask<F>&) const;       \
+  KEYWORD template void LightPathAovs::mark_stored<F>(const UInt<F>&, const Mask<F>&) const;       \
+  KEYWORD template void LightPathAovs::offer<F>(const UInt<F>&, const UInt<F>&,                    \
+                                                const ScatteringEvent<F>&, const Mask<F>&) const;  \
+  KEYWORD template void LightPathAovs::record_connection<F>(                                       \
+      const UInt<F>&, const ScatteringEvent<F>&, const Mask<F>&) const;                            \
+  KEYWORD template Mask<F> store_light_vertex<F>(const LightVertices&, uint32_t,                   \
+                                                 const LightPathRow<F>&, const ShadingRecord<F>&,  \
+                                                 const UInt<F>&, const Vec3<F>&, const Mask<F>&)

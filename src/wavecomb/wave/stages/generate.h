@@ -32,7 +32,7 @@ const float* generate(Wave& wave, const WaveContext& context, const WaveTask& ta
     const U pixel = gather<U>(task.pixels, index, Mask<U>(active));
     const U sample = slot - index * task.samples + task.first_sample;
     const SampleKey<F> key = make_sample_key<F>(pixel, sample, settings.seed);
-    const Sample4<F> r = sample_4d<F>(settings.sampler, key, kCameraSet);
+    const Sample4<F> r = inlined_sample_4d<F>(settings.sampler, key, kCameraSet);
     F time(0.f);
     if (context.moves()) {
       time = camera_time<F>(camera, F(Int<F>(pixel & 0xffffu)), F(Int<F>(pixel >> 16)),
