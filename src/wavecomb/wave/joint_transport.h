@@ -7,6 +7,8 @@
 ///   Wave::joint          data of a worker (its Buffers)
 ///   JointTransport       the class, a template parameter of vertex kernels
 ///   WaveTask::joint      marks tasks that trace light paths instead of camera paths
+///   WAVECOMB_SHARED_JOINT_TRANSPORT   its functions that kernels do not inline
+///                        (wave/kernels/shared_kernels.h)
 ///   JointStages          additional wave stages (wave/run_wave.h), chosen in wave/wave.lanes.cpp
 ///
 /// The joint transport's settings are rows of core/settings_table.cpp, and its kernels are a row of
@@ -14,6 +16,9 @@
 #pragma once
 
 #include "wavecomb/light_paths/coupling.h"
+#include "wavecomb/light_paths/shared_functions.h"
+
+#define WAVECOMB_SHARED_JOINT_TRANSPORT WAVECOMB_SHARED_LIGHT_PATHS
 
 namespace wavecomb {
 

@@ -55,12 +55,11 @@ class Plot(pg.PlotWidget):
 
     def __init__(self, name: str, title: str, parent: QWidget | None = None) -> None:
         axes = {side: AmountAxis(side) for side in ("left", "bottom")}
-        super().__init__(parent, axisItems=axes)
+        super().__init__(parent, axisItems=axes, enableMenu=False)
         self.setObjectName(name)
         self.setAccessibleName(title)
         item = self.getPlotItem()
         item.hideButtons()
-        item.setMenuEnabled(False)
         item.setMouseEnabled(False, False)
         self._title = title
         self.setMinimumSize(theme.em(12), theme.em(6))

@@ -25,54 +25,67 @@ Curve = Callable[[Run], tuple[list[float], list[float]]]
 
 
 class PlotsPanel(QWidget):
-    """Panel that groups the session's statistics into runs and plots them in the visible tab."""
+    """Panel that groups the session's statistics into runs and plots them in the visible tab.
+
+    The tabs are created when the panel is shown for the first time, since creating their plots
+    takes half of the time of creating a window.
+    """
+
+    phases: PhasePlot
+    materials: MaterialsTab
+    runs: RunsTab
+    tabs: QTabWidget
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._session = session
         self._revision = PictureRevision(session, self)
         self.log = RunLog()
-        self.phases = PhasePlot()
-        self.materials = MaterialsTab()
-        self.runs = RunsTab(session, self.log)
         self._curves: dict[Curves, Curve] = {}
         self._legends: list[Legend] = []
-        self.tabs = QTabWidget()
-        self.tabs.setObjectName("plots_tabs")
-        self.tabs.setDocumentMode(True)
-        self.tabs.addTab(self._time_tab(), "Time")
-        self.tabs.addTab(self._coherence_tab(), "Coherence")
-        self.tabs.addTab(self.materials, "Materials")
-        self.tabs.addTab(self.runs, "Runs")
-        for i, tip in enumerate(
-            (
-                "Phases of the threads, and samples and rays per second.",
-                "Lane utilisation, run length and homogeneity of queues.",
-                "Cost per record and number of records of each material.",
-                "Comparison of recent runs.",
-            )
-        ):
-            self.tabs.setTabToolTip(i, tip)
+        self._is_created = False
         self._line = QLabel(EMPTY)
         self._line.setObjectName("plots_line")
         self._line.setWordWrap(True)
-        layout = QVBoxLayout(self)
-        layout.addWidget(self.tabs, 1)
-        layout.addWidget(self._line)
+        QVBoxLayout(self).addWidget(self._line)
         self.setObjectName("plots_panel")
         self.setAccessibleName("Plots")
+        session.statistics.connect(self._take)
+        session.frame.connect(self._finish)
+        theme.on_change(self.refresh)
+
+    # ---- construction
+    # --------------------------------------------------------------------------------
+
+    def _create_tabs(self) -> None:
+        self._is_created = True
+        self.phases = PhasePlot()
+        self.materials = MaterialsTab()
+        self.runs = RunsTab(self._session, self.log)
+        self.tabs = QTabWidget()
+        self.tabs.setObjectName("plots_tabs")
+        self.tabs.setDocumentMode(True)
+        for i, (tab, title, tip) in enumerate(
+            (
+                (self._time_tab(), "Time",
+                 "Phases of the threads, and samples and rays per second."),
+                (self._coherence_tab(), "Coherence",
+                 "Lane utilisation, run length and homogeneity of queues."),
+                (self.materials, "Materials",
+                 "Cost per record and number of records of each material."),
+                (self.runs, "Runs", "Comparison of recent runs."),
+            )
+        ):  # fmt: skip
+            self.tabs.addTab(tab, title)
+            self.tabs.setTabToolTip(i, tip)
+        layout = self.layout()
+        assert isinstance(layout, QVBoxLayout)
+        layout.insertWidget(0, self.tabs, 1)
         self.tabs.currentChanged.connect(lambda index: self.refresh())
         self.phases.mode.currentIndexChanged.connect(lambda index: self.refresh())
         self.materials.of.activated.connect(lambda index: self.refresh())
         self.materials.order.activated.connect(lambda index: self.refresh())
         self.runs.changed.connect(self.refresh)
-        session.statistics.connect(self._take)
-        session.frame.connect(self._finish)
-        theme.on_change(self.refresh)
-        self.refresh()
-
-    # ---- construction
-    # --------------------------------------------------------------------------------
 
     def _time_tab(self) -> QWidget:
         samples = self._add_curves("samples_rate", "Samples per second", _rates("samples"))
@@ -158,7 +171,7 @@ class PlotsPanel(QWidget):
 
     def refresh(self) -> None:
         """Draws the visible tab."""
-        if not self.isVisible():
+        if not self._is_created or not self.isVisible():
             return
         series = self.shown()
         names = labels(series)
@@ -185,6 +198,8 @@ class PlotsPanel(QWidget):
 
     def showEvent(self, event: object) -> None:
         """Draws the data that arrived while the panel was hidden."""
+        if not self._is_created:
+            self._create_tabs()
         super().showEvent(event)  # type: ignore[arg-type]
         self.refresh()
 

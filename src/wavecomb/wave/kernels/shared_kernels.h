@@ -12,13 +12,12 @@
 #include "wavecomb/light/emission/emission.h"
 #include "wavecomb/light/filters/shadow.h"
 #include "wavecomb/light/sampling/light_sample.h"
-#include "wavecomb/light_paths/light_path_aovs.h"
-#include "wavecomb/light_paths/light_vertices.h"
 #include "wavecomb/material/inputs/graph_inputs.h"
 #include "wavecomb/material/params.h"
 #include "wavecomb/path/camera/camera_connection.h"
 #include "wavecomb/path/steps/emit.h"
 #include "wavecomb/texture/lookup.h"
+#include "wavecomb/wave/joint_transport.h"
 
 /// Instantiates or declares all shared functions. `KEYWORD` is empty or `extern`.
 #define WAVECOMB_SHARED_KERNELS(KEYWORD, F)                                                        \
@@ -98,13 +97,4 @@
                                                     const Mask<F>&) const;                         \
   KEYWORD template void PathHistory::vertex<F>(uint32_t, const UInt<F>&, const ShadedVertex<F>&,   \
                                                const float*, const Mask<F>&);                      \
-  KEYWORD template void LightPathAovs::shade<F>(uint32_t, const UInt<F>&, const SampleKey<F>&,     \
-                                                const VertexAovs<F>&, const Mask<F>&) const;       \
-  KEYWORD template void LightPathAovs::mark_stored<F>(const UInt<F>&, const Mask<F>&) const;       \
-  KEYWORD template void LightPathAovs::offer<F>(const UInt<F>&, const UInt<F>&,                    \
-                                                const ScatteringEvent<F>&, const Mask<F>&) const;  \
-  KEYWORD template void LightPathAovs::record_connection<F>(                                       \
-      const UInt<F>&, const ScatteringEvent<F>&, const Mask<F>&) const;                            \
-  KEYWORD template Mask<F> store_light_vertex<F>(const LightVertices&, uint32_t,                   \
-                                                 const LightPathRow<F>&, const ShadingRecord<F>&,  \
-                                                 const UInt<F>&, const Vec3<F>&, const Mask<F>&)
+  WAVECOMB_SHARED_JOINT_TRANSPORT(KEYWORD, F)
