@@ -19,6 +19,8 @@ constexpr std::array<uint32_t, 2> kPilotSeeds = {0x6c078965u, 0x9908b0dfu};
 constexpr double kUncounted = 0.02;
 /// Number of paths whose vertices are stored at the same time, which takes about 30 MB.
 constexpr size_t kPathsAtOnce = 65'536;
+/// Number of groups of pixels of the jackknife.
+constexpr size_t kGroups = 10;
 
 /// Stores the luminance of each path of a pilot render. The paths store no vertices, so that they
 /// use the same kernels as the paths of the image.
@@ -148,6 +150,27 @@ double error_of(const PilotRender& pilot, std::span<const uint32_t> pixels,
     errors[i] = std::isfinite(d) ? d * d : 0;
   }
   return trimmed_mean(errors, kUncounted);
+}
+
+double log_ratio_error(const PilotRender& a, const PilotRender& b, std::span<const uint32_t> pixels,
+                       const ImageTiles& tiles) {
+  const auto error_without = [&](const PilotRender& pilot, size_t group) {
+    std::vector<uint32_t> kept;
+    PilotRender part;
+    for (size_t i = 0; i < pixels.size(); ++i) {
+      if (i % kGroups == group) continue;
+      kept.push_back(pixels[i]);
+      part.differences.push_back(pilot.differences[i]);
+    }
+    return std::max(error_of(part, kept, tiles), 1e-30);
+  };
+  std::array<double, kGroups> logs{};
+  for (size_t group = 0; group < kGroups; ++group)
+    logs[group] = std::log(error_without(a, group) / error_without(b, group));
+  const double mean = std::accumulate(logs.begin(), logs.end(), 0.0) / kGroups;
+  double sum = 0;
+  for (const double x : logs) sum += (x - mean) * (x - mean);
+  return std::sqrt(sum * (kGroups - 1) / kGroups);
 }
 
 }  // namespace wavecomb

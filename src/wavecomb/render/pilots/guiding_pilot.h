@@ -65,4 +65,10 @@ PilotRender render_pilot(WaveContext context, Settings settings, const WaveSetup
 double error_of(const PilotRender& pilot, std::span<const uint32_t> pixels,
                 const ImageTiles& tiles);
 
+/// Returns the standard error of the logarithm of error_of(a) / error_of(b), for two pilot renders
+/// of `pixels`, by the jackknife over ten groups of pixels (B. Efron, C. Stein, "The Jackknife
+/// Estimate of Variance", 1981).
+double log_ratio_error(const PilotRender& a, const PilotRender& b, std::span<const uint32_t> pixels,
+                       const ImageTiles& tiles);
+
 }  // namespace wavecomb

@@ -44,7 +44,8 @@ constexpr double kRecordingCost = 1.5;
 constexpr uint64_t kPilotShare = 320, kMinPilotPaths = 2048, kMaxPilotPaths = 65'536;
 constexpr uint32_t kMinPilotSamples = 16, kMaxPilotSamples = 32;
 /// After the first round, the pilot render begins with one of every kFirstPixels pixels. If the
-/// gain there is below kHopelessGain, the other pixels are not rendered.
+/// gain there is below kHopelessGain by more than its standard error, the other pixels are not
+/// rendered.
 constexpr size_t kFirstPixels = 4;
 constexpr double kHopelessGain = 0.8;
 /// Number of samples per pixel that estimate the variance for learned roulette.
@@ -54,7 +55,8 @@ constexpr uint64_t kSpreadShare = 8;
 /// Fraction of the paths that is left out of the variance: the paths with the largest differences.
 constexpr double kTrimmedPaths = 0.001;
 /// Least measured gains in efficiency for which training continues after the first and the second
-/// round. The render is guided if the gain after the second round reaches the second value.
+/// round. The render is guided if the gain after the second round, less its standard error, reaches
+/// the second value.
 constexpr std::array<double, 2> kMinGains = {1.1, 1.25};
 /// Gain at which the third round uses the full training budget of Guiding::kOn. With a lower gain,
 /// it uses half of this budget.
@@ -238,12 +240,16 @@ class Trainer {
     PilotRender with = pilot(first_pixels(), &guide);
     if (round == 0) {
       compare(with, without);
-      if (statistics_.gain < kHopelessGain || ended()) return false;
+      const double highest = statistics_.gain * std::exp(log_gain_error(with, without));
+      if (highest < kHopelessGain || ended()) return false;
       without.append(pilot(other_pixels(), nullptr));
     }
     with.append(pilot(other_pixels(), &guide));
     compare(with, without);
-    return statistics_.gain >= kMinGains[round] && !ended();
+    // A gain that a few pixels determine may be chance, and guiding makes some images noisier.
+    const bool is_last = round + 1 == kMinGains.size();
+    const double error = is_last ? log_gain_error(with, without) : 0.0;
+    return statistics_.gain * std::exp(-error) >= kMinGains[round] && !ended();
   }
 
   /// Sets the gain in efficiency from two pilot renders of the same pixels.
@@ -252,6 +258,12 @@ class Trainer {
     const double guided_cost = error_of(with, pixels, *tiles_) * with.cost;
     if (guided_cost > 0 && !ended())
       statistics_.gain = error_of(without, pixels, *tiles_) * without.cost / guided_cost;
+  }
+
+  /// Returns the standard error of the logarithm of the gain.
+  double log_gain_error(const PilotRender& with, const PilotRender& without) const {
+    const std::span<const uint32_t> pixels = pilot_pixels_;
+    return log_ratio_error(with, without, pixels.first(with.differences.size()), *tiles_);
   }
 
   /// Sets the number of training paths that cost as much as the image. `cost` is the cost of the
