@@ -99,6 +99,18 @@ def test_restarts_with_other_settings_are_series(
 
 
 @pytest.mark.slow
+def test_a_panel_shown_after_the_render(session: Any, qtbot: Any) -> None:
+    """The tabs, which are created when the panel is first shown, have the finished run."""
+    panel = PlotsPanel(session)
+    qtbot.addWidget(panel)
+    render(panel, session, qtbot)
+    panel.show()
+    (curve,) = panel.findChild(Curves, "samples_rate").getPlotItem().listDataItems()
+    assert len(curve.getData()[0]) > 0
+    assert panel.phases.plot.bars
+
+
+@pytest.mark.slow
 def test_phases_per_sample_and_over_time(panel: PlotsPanel, session: Any, qtbot: Any) -> None:
     render(panel, session, qtbot, spp=64)
     look = panel.log.current.run.last

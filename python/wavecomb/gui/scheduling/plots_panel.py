@@ -81,6 +81,7 @@ class PlotsPanel(QWidget):
         layout = self.layout()
         assert isinstance(layout, QVBoxLayout)
         layout.insertWidget(0, self.tabs, 1)
+        self.tabs.show()  # Otherwise refresh(), which draws visible plots only, would draw none.
         self.tabs.currentChanged.connect(lambda index: self.refresh())
         self.phases.mode.currentIndexChanged.connect(lambda index: self.refresh())
         self.materials.of.activated.connect(lambda index: self.refresh())
@@ -171,7 +172,7 @@ class PlotsPanel(QWidget):
 
     def refresh(self) -> None:
         """Draws the visible tab."""
-        if not self._is_created or not self.isVisible():
+        if not self.isVisible():
             return
         series = self.shown()
         names = labels(series)
