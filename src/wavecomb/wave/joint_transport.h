@@ -7,8 +7,8 @@
 ///   Wave::joint          data of a worker (its Buffers)
 ///   JointTransport       the class, a template parameter of vertex kernels
 ///   WaveTask::joint      marks tasks that trace light paths instead of camera paths
-///   WAVECOMB_SHARED_JOINT_TRANSPORT   its functions that kernels do not inline
-///                        (wave/kernels/shared_kernels.h)
+///   WAVECOMB_SHARED_JOINT_TRANSPORT   functions of the joint transport that kernels
+///                        do not inline (wave/kernels/shared_kernels.h)
 ///   JointStages          additional wave stages (wave/run_wave.h), chosen in wave/wave.lanes.cpp
 ///
 /// The joint transport's settings are rows of core/settings_table.cpp, and its kernels are a row of

@@ -19,7 +19,7 @@ constexpr std::array<uint32_t, 2> kPilotSeeds = {0x6c078965u, 0x9908b0dfu};
 constexpr double kUncounted = 0.02;
 /// Number of paths whose vertices are stored at the same time, which takes about 30 MB.
 constexpr size_t kPathsAtOnce = 65'536;
-/// Number of groups of pixels of the jackknife.
+/// Number of groups of pixels from which log_ratio_error() estimates the error.
 constexpr size_t kGroups = 10;
 
 /// Stores the luminance of each path of a pilot render. The paths store no vertices, so that they
