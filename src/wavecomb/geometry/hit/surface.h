@@ -139,8 +139,8 @@ WAVECOMB_INLINE void set_triangle_uv(const SceneView& scene, const MeshHit<F>& h
   s.dpdu = maps.vector(tangent);
 }
 
-/// Computes setup_surface(). `kWithCurves` may be false for scenes without curves, and `kWithMotion`
-/// for scenes without motion.
+/// Computes setup_surface(). `kWithCurves` may be false for scenes without curves, and
+/// `kWithMotion` for scenes without motion.
 template <typename F, bool kWithCurves, bool kWithMotion>
 WAVECOMB_INLINE Surface<F> compute_surface(const SceneView& scene, const MeshHit<F>& hit,
                                            const Vec3<F>& dir, bool with_uv, bool with_terminator,
