@@ -6,7 +6,8 @@
 
 Stages are given by their names in STAGES, as ``@tuning`` or ``@validation``, or as files. Each
 stage is rendered with several seeds in each mode of ``--ways``, with one thread; the first mode is
-the baseline. Errors are squared relative errors (x - r)^2 / (r^2 + 0.01) against a reference r. The
+the baseline. The mode ``@combinations`` stands for all combinations of guiding, light paths and
+allocation. Errors are squared relative errors (x - r)^2 / (r^2 + 0.01) against a reference r. The
 reference is the mean of four renders of ``--reference`` samples in the best mode for the stage, and
 is cached in ``out/defaults``. With ``--reference 0``, r is the mean of all images of the stage,
 which needs no further renders but understates errors by a few per cent. Error percentiles are taken
@@ -85,20 +86,37 @@ WAYS: dict[str, dict[str, Any]] = {
     "light": {"guiding": "off", "transport": "light"},
     "light-auto": {"guiding": "off", "transport": "auto"},
     "merged": {"guiding": "off", "transport": "light", "merge_radius": 1.0},
+    "guided light-auto": {"guiding": "on", "transport": "auto"},
     "efficiency": {"guiding": "off", "transport": "path", "allocate": "efficiency"},
     "guided+efficiency": {"guiding": "on", "transport": "path", "allocate": "efficiency"},
     "light+efficiency": {"guiding": "off", "transport": "light", "allocate": "efficiency"},
 }
+COMBINATIONS = {
+    f"{guiding} {transport} {allocate}": {"guiding": guiding, "allocate": allocate} | settings
+    for guiding in ("off", "on")
+    for transport, settings in {
+        "path": {"transport": "path"},
+        "light": {"transport": "light"},
+        "merged": {"transport": "light", "merge_radius": 1.0},
+    }.items()
+    for allocate in ("even", "efficiency")
+    if allocate == "even" or transport != "merged"
+}
+"""All combinations of guiding, light paths and allocation; merging needs even allocation."""
+WAYS |= COMBINATIONS
 PERCENTILES = (50, 90, 99, 99.9)
 
 
 def load(name: str, folder: Path) -> Any:
-    """Load a stage by its name in STAGES or by its path."""
+    """Load the scene of a stage by its name in STAGES or by its path."""
     stage = STAGES.get(name)
     if stage is None:
         path = Path(name)
-        return wavecomb.load(path if path.exists() else ASSETS / name)
-    return wavecomb.load(stage_file(folder / f"{name}.usdc", stage.scene, **stage.options))
+        path = path if path.exists() else ASSETS / name
+    else:
+        path = stage_file(folder / f"{name}.usdc", stage.scene, **stage.options)
+    # A loaded stage would keep its renderer, with the results of pilot renders; a scene does not.
+    return wavecomb.load(path).scene
 
 
 def render(scene: Any, way: str, spp: int, seed: int, size: tuple[int, int]) -> tuple[Any, float]:
@@ -207,7 +225,9 @@ def main() -> None:
     """Run the benchmark."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("stages", nargs="+")
-    parser.add_argument("--ways", nargs="+", default=["plain", "default"], choices=list(WAYS))
+    parser.add_argument(
+        "--ways", nargs="+", default=["plain", "default"], choices=[*WAYS, "@combinations"]
+    )
     parser.add_argument("--spp", type=int, nargs="+", default=[64])
     parser.add_argument("--size", type=int, nargs=2, default=[96, 96])
     parser.add_argument("--seeds", type=int, default=4)
@@ -216,6 +236,8 @@ def main() -> None:
     parser.add_argument("--output", type=Path, default=RESULTS / "defaults.json")
     options = parser.parse_args()
     names = [name for given in options.stages for name in SETS.get(given, [given])]
+    sets = {"@combinations": list(COMBINATIONS)}
+    options.ways = [way for given in options.ways for way in sets.get(given, [given])]
     rows: list[dict[str, Any]] = []
     for name in names:
         for spp in options.spp:

@@ -93,6 +93,6 @@ def test_nothing_is_connected_where_one_scattering_is_all(mixed: Any) -> None:
 
 
 def test_what_it_does_not_go_with_is_one_line(mixed: Any) -> None:
-    with pytest.raises(ValueError, match="transport bdpt does not go with guiding") as error:
-        render(mixed, guiding="on")
+    with pytest.raises(ValueError, match="transport bdpt does not go with clamp_indirect") as error:
+        render(mixed, clamp_indirect=1.0)
     assert "\n" not in str(error.value)

@@ -85,23 +85,25 @@ def test_one_picture_whatever_the_schedule(
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("guiding", ["off", "on"])
 @pytest.mark.parametrize(
     "transport",
     [{"transport": "light"}, {"transport": "bdpt"}, {"transport": "light", "merge_radius": 1.0}],
     ids=["light", "bdpt", "merged"],
 )
-def test_roulette_learns_beside_light_paths(cornell: Any, transport: dict[str, Any]) -> None:
+def test_learns_beside_light_paths(cornell: Any, transport: dict[str, Any], guiding: str) -> None:
     """The film of training has no sums for light paths, which must not write there."""
-    way = {"roulette": "efficient", **transport}
+    way = {"roulette": "efficient", "guiding": guiding, **transport}
     plain = render(cornell, **way)
     assert plain.stats["guiding"]["paths"] >= 12000
+    assert (plain.stats["guiding"]["guided_share"] > 0) == (guiding == "on")
     for other in ({"lanes": 1, "threads": 1, "wave_size": 64}, {"integrator": "reference"}):
         assert np.array_equal(plain.beauty, render(cornell, **way, **other).beauty), other
     without = render(cornell, **transport, roulette="off")
     assert plain.beauty.mean() == pytest.approx(without.beauty.mean(), rel=0.01)
 
 
-@pytest.mark.parametrize("way", WAYS, ids=str)
+@pytest.mark.parametrize("way", [*WAYS, {"guiding": "on", "transport": "light"}], ids=str)
 @pytest.mark.slow
 def test_parts_are_those_of_the_whole(cornell: Any, way: dict[str, Any]) -> None:
     whole = render(cornell, **way)

@@ -155,7 +155,6 @@ def test_a_resumed_picture_is_that_which_nothing_stopped(stages: Any, tmp_path: 
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"guiding": "on"}, "guiding"),
         ({"clamp_indirect": 1.0}, "clamp_indirect"),
         ({"cosine_sampling": True}, "cosine_sampling"),
         ({"aovs": ("lpe:a=C.{10}D.*[LO]",)}, "too many states"),

@@ -113,7 +113,8 @@ def test_each_part_can_be_forced(caustics: Any, quality: str) -> None:
     assert light.stats["transport"] is None and light.stats["guiding"] is None
     guided = render(caustics, **{**way, "spp": 8}, guiding="on")
     assert guided.stats["guiding"]["paths"] > 0
-    assert quality == "plain" or "guiding" in guided.stats["transport"]["why"]
+    both = render(caustics, **{**way, "spp": 8}, guiding="on", transport="light")
+    assert both.stats["guiding"]["paths"] > 0 and both.stats["transport"] is None
 
 
 def check_parts_and_schedules(scene: Any, decided: Any) -> None:

@@ -50,7 +50,6 @@ def test_auto_uses_light_paths_for_caustics_alike_for_all_schedules(caustics: Pa
     ("settings", "why"),
     [
         ({"size": (32, 32), "spp": 16}, "too few samples"),
-        ({"guiding": "on"}, "do not go with guiding"),
         ({"aovs": ("lpe:a=C.{10}D.*[LO]",)}, "no room for so many light path expressions"),
         ({"clamp_indirect": 1.0}, "do not go with clamp_indirect"),
     ],
@@ -62,6 +61,15 @@ def test_auto_is_path_where_light_paths_do_not_go(
     choice = chosen(wavecomb.load(caustics), **settings)
     assert choice["chosen"] == "path" and choice["gain"] is None
     assert why in choice["why"] and "\n" not in choice["why"]
+
+
+@pytest.mark.slow
+def test_guiding_does_not_change_the_choice(caustics: Path) -> None:
+    """The transport is chosen without guiding, which is then trained for what light paths leave."""
+    stage = wavecomb.load(caustics)
+    choice, guided = chosen(stage), chosen(stage, guiding="on")
+    assert choice["chosen"] == "light"
+    assert {**guided, "seconds": 0} == {**choice, "seconds": 0}
 
 
 def test_auto_is_path_where_there_are_holdouts(caustics: Path) -> None:

@@ -69,6 +69,9 @@ SINGLE: dict[str, dict[str, Any]] = {
     "light": {"transport": "light"},
     "bdpt": {"transport": "bdpt"},
     "merged": {"transport": "light", "merge_radius": 0.25},
+    "guided light": {"guiding": "on", "transport": "light"},
+    "guided bdpt": {"guiding": "on", "transport": "bdpt"},
+    "guided merged": {"guiding": "on", "transport": "light", "merge_radius": 0.25},
 }
 CHOICES: dict[str, tuple[Any, ...]] = {
     "roulette": ("off", "throughput", "cost-aware", "efficient"),
@@ -153,8 +156,8 @@ def variants(scene: RandomScene, seed: int) -> list[Variant]:
         if way < 2:
             mixed["transport"] = ("light", "bdpt")[way]
             mixed["light_aim"] = ("on", "off")[int(random.integers(2))]
-        else:
-            mixed["guiding"] = ("off", "on")[int(random.integers(2))]
+        mixed["guiding"] = ("off", "on")[int(random.integers(2))]
+        if way >= 2:
             mixed["cosine_sampling"] = bool(random.integers(2))
         found.append(Variant(f"mixed {k}", mixed, {}))
     if scene.single_light:
@@ -225,7 +228,8 @@ class Renders:
         """Return a render that has trained a guiding field with these settings."""
         import wavecomb
 
-        key = str(settings["cosine_sampling"])
+        names = ("cosine_sampling", "transport", "light_aim", "merge_radius")
+        key = str([settings.get(name) for name in names])
         if key not in self.trained:
             self.trained[key] = wavecomb.render(stage, spp=TRAINING_SPP, seed=99_999, **settings)
         return self.trained[key]

@@ -7,7 +7,6 @@
 namespace wavecomb {
 
 LightPathConflict light_path_conflict(const Settings& s) {
-  if (s.guiding == Guiding::kOn) return {"guiding on", "guiding off or auto"};
   if (s.clamp_indirect > 0) return {"clamp_indirect", "clamp_indirect 0"};
   if (s.cosine_sampling) return {"cosine_sampling", "none"};
   if (s.aovs.has(Aov::kDeep)) return {"the AOV deep, which lacks light path contributions", "none"};

@@ -14,9 +14,10 @@
 /// The density ratio R is multiplied by the factors of each vertex of the path. At a delta lobe the
 /// ratio of densities is the ratio of the solid angles,
 ///   p<- / p-> = |w z| / (|l z| eta^2),
-/// where z is the shading normal, and eta the relative index of refraction from w to l. The density
-/// ratio R is 0 if light paths cannot be connected to the camera. This is the case if x_1 is
-/// specular or on a fibre, or if its shading normal is adjusted to the viewer.
+/// where z is the shading normal, and eta the relative index of refraction from w to l; if the
+/// bounce of the camera path is guided, this is divided by the share of bounces that the BSDF
+/// samples. The density ratio R is 0 if light paths cannot be connected to the camera. This is the
+/// case if x_1 is specular or on a fibre, or if its shading normal is adjusted to the viewer.
 ///
 /// With connections between vertices of camera paths and light paths, R is the sum over the third
 /// technique and all connections of x_i to x_i+1. For such a connection,
@@ -32,6 +33,7 @@
 /// density ratio R to 0.
 #pragma once
 
+#include "wavecomb/guiding/bounce/guided_bounce.h"
 #include "wavecomb/light/emission/emission.h"
 #include "wavecomb/light_paths/connection.h"
 #include "wavecomb/light_paths/context.h"
@@ -176,7 +178,8 @@ WAVECOMB_INLINE void offer_connection(const Context& context, const JointVertex<
   const BsdfEval<F> e = at.bsdf.eval(context.view, wi);
   const Mask<F> usable = wanted & c.valid & at.is_consistent(w, wi);
   const Color<F> light = at.throughput * e.f_cos * offer.vertices;
-  offer.row = {c.o, e.pdf, select<F>(usable, clean<F>(light, 0.f), Color<F>(F(0.f))),
+  const F bounce = mixed_pdf<Bsdf, F>(v, context.guide, w, wi, context.wo, e.pdf);
+  offer.row = {c.o, bounce, select<F>(usable, clean<F>(light, 0.f), Color<F>(F(0.f))),
                joint.template towards<Bsdf>(v, at, context.wo, w, wi, usable)};
   if (v.wants_events()) [[unlikely]]
     offer.scattering =
@@ -201,6 +204,8 @@ WAVECOMB_INLINE F next_ratio(const Context& c, const JointVertex<F>& joint, bool
     const F z = abs(b.wi.z) * F(b.eta * b.eta);
     F by_angle = joint.ratio * F(abs(dot(at.s.ng, world)) * joint.inverse_cos) *
                  F(abs(wo.z) / select(z > 0.f, z, F(1.f)));
+    if (v.guide) [[unlikely]]
+      by_angle = by_angle / select(c.guide.guided, c.guide.bsdf_share, F(1.f));
     by_angle = select(is_asymmetric<Bsdf, F>(at.bsdf, wo, b.wi), F(0.f), by_angle);
     r = select(b.is_delta, v.depth == 0 ? F(0.f) : by_angle, r);
   }

@@ -35,10 +35,8 @@
 
 #include <array>
 
-#include "wavecomb/light/emission/emission.h"
-#include "wavecomb/light_paths/connection.h"
 #include "wavecomb/light_paths/join.h"
-#include "wavecomb/light_paths/light_path.h"
+#include "wavecomb/light_paths/light_path_point.h"
 #include "wavecomb/light_paths/scattering.h"
 #include "wavecomb/path/camera/camera_connection.h"
 #include "wavecomb/path/steps/interact.h"
@@ -52,120 +50,6 @@ namespace detail {
 inline constexpr float kMinRatio = 1e-9f;
 /// Minimum cosine between the normals of a merge point and of a vertex that is merged with it.
 inline constexpr float kMinNormalCosine = 0.7f;
-
-/// Shading point of a light path, with the direction from which light arrives.
-template <typename Bsdf, typename F, typename Interaction>
-struct LightPathPoint {
-  const Interaction& at;
-  const LightPathState<F>& from;  ///< state of the light path before the vertex
-  Frame<F> frame;
-  Vec3<F> l;      ///< direction to the light in the shading frame (see light_paths/connection.h)
-  F inverse_cos;  ///< 1 / |g l|
-  Color<F> flux;  ///< flux that arrives at the vertex
-  F connection_density;   ///< term F = d^2 / p<- (see the top of the file)
-  F sampled;              ///< density of light samples at the first vertex; 0 at later vertices
-  Mask<F> by_light_only;  ///< lanes with a light that bounces cannot hit
-  Mask<F> active;
-
-  /// Returns the ratio |g w| / |g l| of cosines for a world direction w.
-  F cosine_ratio(const Vec3<F>& w) const { return abs(dot(at.s.ng, w)) * inverse_cos; }
-  /// Returns the density of camera paths, where `bounce` is the density of their bounces.
-  F camera_density(const F& bounce) const {
-    return select(by_light_only, F(0.f), bounce) + sampled;
-  }
-  /// Returns the density of camera paths relative to light paths, S (p-> + p_light) + F.
-  F relative_density(const F& bounce) const {
-    return from.mis_sum * camera_density(bounce) + connection_density;
-  }
-};
-
-template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction>
-WAVECOMB_INLINE LightPathPoint<Bsdf, F, Interaction> light_path_point(const Vertex<F, kFeatures>& v,
-                                                                      const Interaction& at,
-                                                                      const LightPathState<F>& from,
-                                                                      bool connects,
-                                                                      const Mask<F>& is_first) {
-  const Vec3<F> back = -v.path.dir;
-  const F cosine = abs(dot(at.s.ng, back));
-  // Use the ray along which a bounce of a camera path would hit the previous vertex.
-  Connection<F> c = connect_to_point<F>(at, v.path.o);
-  const Mask<F> from_infinite =
-      is_first & Mask<F>(from.light < UInt<F>(v.scene.lights.infinite_count));
-  c.o = select<F>(from_infinite, at.origin(back), c.o);
-  c.d = select<F>(from_infinite, back, c.d);
-  const F distance = select(from_infinite, v.t, sqrt(c.distance2));
-  LightPathPoint<Bsdf, F, Interaction> path_point{at,
-                                                  from,
-                                                  at.unadjusted_frame(v),
-                                                  {},
-                                                  F(1.f / select(cosine > 0.f, cosine, F(1.f))),
-                                                  flux_at<Bsdf, F>(v, at, is_first),
-                                                  F(0.f),
-                                                  F(0.f),
-                                                  Mask<F>(false),
-                                                  Mask<F>(false)};
-  path_point.l = path_point.frame.to_local(c.d);
-  path_point.active =
-      v.active & (cosine > 0.f) & (from_infinite | c.valid) & at.is_consistent(c.d, path_point.l);
-  if (const Mask<F> first = path_point.active & is_first; any(first)) {
-    LightReceiver<F> receiver(c.o);
-    if (v.scene.lights.by_tree && !Bsdf::kTransmits)
-      receiver.normal =
-          pack_normal<F>(select<F>(path_point.l.z < 0.f, -path_point.frame.n, path_point.frame.n));
-    const CameraPathDensity<F> reach =
-        camera_path_density<F>(v.scene.lights, from.light, receiver, c.d, distance, first);
-    // Camera paths take no light samples at vertices that have only delta lobes.
-    path_point.sampled = select(first & at.bsdf.has_non_delta(), reach.density, F(0.f));
-    path_point.by_light_only = first & reach.is_delta;
-  }
-  if (connects) {
-    const Mask<F> can_connect_back = path_point.active & (from.bounce_pdf > 0.f);
-    const F connection_density =
-        F(distance * distance) / select(can_connect_back, from.bounce_pdf, F(1.f));
-    path_point.connection_density =
-        select(can_connect_back, min(connection_density, F(kMaxRatio)), F(0.f));
-  }
-  return path_point;
-}
-
-/// Viewer of a vertex: the direction from the vertex to the viewer, and whether the vertex scatters
-/// light towards the viewer.
-template <typename F>
-struct Viewer {
-  Vec3<F> w, local;
-  F distance2;
-  Mask<F> is_visible;
-};
-
-template <typename Bsdf, typename F, uint32_t kFeatures, typename PathPoint>
-WAVECOMB_INLINE Viewer<F> viewer_at(const Vertex<F, kFeatures>& v, const PathPoint& path_point,
-                                    const Vec3<F>& to, const Mask<F>& wanted) {
-  const auto& at = path_point.at;
-  Viewer<F> out;
-  const Vec3<F> offset = to - at.s.p;
-  out.distance2 = length_squared(offset);
-  out.w = offset * F(1.f / sqrt(select(out.distance2 > 0.f, out.distance2, F(1.f))));
-  out.local = path_point.frame.to_local(out.w);
-  out.is_visible = wanted & (out.distance2 > 0.f) & at.is_consistent(out.w, out.local) &
-                   not_(at.is_adjusted(v, path_point.frame, -out.w));
-  if (Bsdf::kAbsorbs) out.is_visible = out.is_visible & (dot(at.s.ng, out.w) > 0.f);
-  return out;
-}
-
-/// Sets up the shadow ray towards the viewer at `to`, for the contribution `light`.
-template <typename F, typename PathPoint>
-WAVECOMB_INLINE void set_visibility_ray(const PathPoint& path_point, const Viewer<F>& viewer,
-                                        const Vec3<F>& to, const Color<F>& light,
-                                        VertexResult<F>& out) {
-  out.direct = clean<F>(light, 0.f);
-  out.has_shadow = viewer.is_visible & (max_component(out.direct) > 0.f);
-  out.shadow_o = path_point.at.clear_origin(viewer.w);
-  const Vec3<F> ray = to - out.shadow_o;
-  const F length2 = length_squared(ray);
-  const F size = sqrt(select(length2 > 0.f, length2, F(1.f)));
-  out.shadow_d = ray * F(1.f / size);
-  out.shadow_tfar = size * kShadowRayFraction;
-}
 
 /// Classifies the scattering towards the viewer, if light path expressions need it.
 template <typename F, uint32_t kFeatures, typename PathPoint>
@@ -207,8 +91,9 @@ WAVECOMB_INLINE void connect_vertex_to_camera(const Vertex<F, kFeatures>& v,
   if (none(viewer.is_visible)) return;
   const BsdfEval<F> e = at.bsdf.eval(at.bsdf.view(viewer.local), path_point.l);
   const F camera_factor = path_point.cosine_ratio(viewer.w) * c.density;
+  const F bounce = path_point.camera_bounce(v, viewer.local, e.pdf).pdf;
   const F relative_density =
-      path_point.relative_density(e.pdf) * F(camera_factor * setup.paths.share);
+      path_point.relative_density(bounce) * F(camera_factor * setup.paths.share);
   const F brightness =
       camera_factor * (setup.paths.share * setup.camera.exposure) / F(1.f + relative_density);
   const Color<F> light = path_point.flux * e.f_cos * brightness;
@@ -259,8 +144,9 @@ WAVECOMB_INLINE void merge(const Vertex<F, kFeatures>& v, const LightPathSetup& 
     const BsdfEval<F> e = at.bsdf.eval(at.bsdf.view(local), path_point.l);
     const F area = F(point.radius * point.radius) * kPi;
     const F camera_factor = path_point.inverse_cos / select(is_visible, area, F(1.f));
+    const F bounce = path_point.camera_bounce(v, local, e.pdf).pdf;
     const F relative_density =
-        path_point.relative_density(e.pdf) * F(camera_factor * setup.paths.share);
+        path_point.relative_density(bounce) * F(camera_factor * setup.paths.share);
     const F brightness =
         camera_factor * (setup.paths.share * setup.camera.exposure) / F(1.f + relative_density);
     const Color<F> light = path_point.flux * e.f_cos * point.light * brightness;
@@ -291,8 +177,9 @@ WAVECOMB_INLINE void connect(const Vertex<F, kFeatures>& v, const PathPoint& pat
   const F inverse_distance2 = 1.f / select(viewer.is_visible, viewer.distance2, F(1.f));
   const F cosine_ratio = path_point.cosine_ratio(viewer.w) * inverse_distance2;
   const F before = min(F(target.ratio * F(back * inverse_distance2)), F(kMaxRatio));
+  const F bounce = path_point.camera_bounce(v, viewer.local, e.pdf).pdf;
   const F relative_density =
-      min(F(path_point.relative_density(e.pdf) * F(cosine_ratio * target.pdf)), F(kMaxRatio));
+      min(F(path_point.relative_density(bounce) * F(cosine_ratio * target.pdf)), F(kMaxRatio));
   const F brightness = cosine_ratio / F(F(1.f + before) + relative_density);
   set_visibility_ray<F>(path_point, viewer, target.from,
                         Color<F>(path_point.flux * e.f_cos * target.light * brightness), out);
@@ -314,7 +201,8 @@ WAVECOMB_INLINE void scatter_flux(const Vertex<F, kFeatures>& v, const LightPath
   const F over_pdf = cosine_ratio / select(b.pdf > 0.f, b.pdf, F(1.f));
   const BsdfEval<F> e = at.bsdf.eval(at.bsdf.view(b.wi), path_point.l);
   Color<F> weight = e.f_cos * over_pdf;
-  F s = from.mis_sum * F(path_point.camera_density(e.pdf) * over_pdf);
+  const CameraBounce<F> bounce = path_point.camera_bounce(v, b.wi, e.pdf);
+  F s = from.mis_sum * F(path_point.camera_density(bounce.pdf) * over_pdf);
   if (connects) s = fma(path_point.connection_density, over_pdf, s);
   Mask<F> continues = v.active;
   if (any(b.is_delta)) {
@@ -322,7 +210,8 @@ WAVECOMB_INLINE void scatter_flux(const Vertex<F, kFeatures>& v, const LightPath
     const F z = abs(b.wi.z);
     const F angles = cosine_ratio * F(abs(path_point.l.z) / select(z > 0.f, z, F(1.f)));
     weight = select<F>(b.is_delta, b.weight * F(angles * eta2), weight);
-    const F by_angle = select(path_point.by_light_only, F(0.f), F(angles / eta2));
+    const F by_angle =
+        select(path_point.by_light_only, F(0.f), F(F(angles / eta2) * bounce.bsdf_share));
     s = select(b.is_delta, F(from.mis_sum * by_angle), s);
     continues = not_(b.is_delta & is_asymmetric<Bsdf, F>(at.bsdf, path_point.l, b.wi));
   }

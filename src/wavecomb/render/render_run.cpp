@@ -56,6 +56,11 @@ PassState RenderRun::resume() {
   return pass;
 }
 
+CameraPathPart RenderRun::camera_part() const {
+  if (!plan_.settings.joins_light()) return {};
+  return transport_ ? transport_->camera : kUnknownCameraPart;
+}
+
 void RenderRun::work(PilotCache& cache, const PilotShared& shared,
                      const std::function<void(const PilotResults&)>& learned) {
   const auto stopped = [this] { return watch_.stopped(); };
@@ -67,6 +72,7 @@ void RenderRun::work(PilotCache& cache, const PilotShared& shared,
           .costs = costs_,
           .profile = options_.profile,
           .light_settings = shared.image ? *shared.image : plan_.settings,
+          .camera = camera_part(),
           .learned = learned_before_,
           .joint = shared.joint ? *shared.joint : nullptr,
           .stopped = stopped,

@@ -58,6 +58,8 @@ class RenderRun {
  private:
   /// Fills the film from a checkpoint, if there is one. Returns the state of the checkpoint's pass.
   PassState resume();
+  /// Returns the part of camera paths in the error and cost of the render without guiding.
+  CameraPathPart camera_part() const;
   void work(PilotCache& cache, const PilotShared& shared,
             const std::function<void(const PilotResults&)>& learned);
   void take_snapshot(bool is_finished);

@@ -78,7 +78,7 @@ class LightJointTracer {
     aovs.wants_events = light_.aovs.wants_events();
     const VertexResult<F> v = kShadeLightVertex<F>[scene.material_program[at.material]](
                                   {scene, settings_, from.key, depth, mesh_hit, hit.geom, hit.t,
-                                   at.material, state, &aovs, true},
+                                   at.material, state, &aovs, true, context_.guide},
                                   from.light_state(), setup_, & target)
                                   .v;
     if (aovs.wants_events) light_.aovs.record_connection<F>(kOnlySlot, aovs.light_scattering, true);

@@ -118,7 +118,7 @@ class LightTracer {
         light_path_state<F>(*context_.camera, at.path, hit.t, rays_.time(), true);
     return kShadeLightVertex<F>[scene.material_program[material]](
         {scene, settings_, at.path.key, at.depth, mesh_hit, hit.geom, hit.t, material, state, &aovs,
-         true},
+         true, context_.guide},
         at.path.light_state(), setup_, nullptr);
   }
 

@@ -78,6 +78,8 @@ Settings pilot_settings(const Settings& settings, uint32_t width, uint32_t heigh
   small.light_groups.clear();
   small.expressions.clear();
   small.transport = Transport::kLight;
+  // Guiding is decided after the transport.
+  small.guiding = Guiding::kOff;
   return small;
 }
 
@@ -181,10 +183,14 @@ TransportGain transport_gain(const TransportPilots& pilots, const PilotWork& wit
   for (size_t k = 0; k < kCandidateShares.size(); ++k) {
     const auto& with = pilots.with[k];
     if (!is_candidate(with)) continue;
-    PixelNoise noise(pixels);
-    for (size_t i = 0; i < pixels; ++i)
-      noise[i] = 0.5 * scale[i] *
-                 squared(double{brightness(with[0].beauty, i)} - brightness(with[1].beauty, i));
+    PixelNoise noise(pixels), by_light(pixels);
+    for (size_t i = 0; i < pixels; ++i) {
+      const auto noise_of = [&](const std::vector<float>& a, const std::vector<float>& b) {
+        return 0.5 * scale[i] * squared(double{brightness(a, i)} - brightness(b, i));
+      };
+      noise[i] = noise_of(with[0].beauty, with[1].beauty);
+      by_light[i] = noise_of(with[0].by_light_paths, with[1].by_light_paths);
+    }
     const PilotWork work = work_of(with);
     double cost = work.cost(kJointVertex);
     if (pilots.merges)
@@ -192,13 +198,20 @@ TransportGain transport_gain(const TransportPilots& pilots, const PilotWork& wit
               kMergedVertex * (work.records - without.records);
     PilotError error;
     error.all = sum(noise) * cost;
-    error.of_most = sum_of_most(std::move(noise)) * cost;
+    const double noise_of_most = sum_of_most(std::move(noise));
+    error.of_most = noise_of_most * cost;
+    const double light_of_most = sum_of_most(std::move(by_light));
+    const double light_cost = std::max(0.0, cost - without.cost(kJointVertex));
     const double gain = std::max(ratio_of(best.without.all, error.all),
                                  ratio_of(best.without.of_most, error.of_most));
     if (gain <= best.gain) continue;
     best.gain = gain;
     best.share = kCandidateShares[k];
     best.with = error;
+    const auto camera_part = [](double light, double whole) {
+      return 1 - std::clamp(ratio_of(light, whole), 0.0, 1.0);
+    };
+    best.camera = {camera_part(light_of_most, noise_of_most), camera_part(light_cost, cost)};
   }
   return best;
 }
@@ -331,6 +344,7 @@ TransportChoice choose_transport(const Scene& scene, const Settings& settings, u
   if (found.gain >= kMinLightPathGain) {
     choice.transport = Transport::kLight;
     choice.share = found.share;
+    choice.camera = found.camera;
   }
   choice.seconds = seconds_since(start);
   return choice;

@@ -40,7 +40,8 @@ namespace wavecomb {
 /// The chosen transport, with the reason.
 struct TransportChoice {
   Transport transport = Transport::kPath;
-  LightPathShare share;  ///< for Transport::kLight
+  LightPathShare share;   ///< for Transport::kLight
+  CameraPathPart camera;  ///< of the render with the chosen transport
   /// Whether light paths are merged within one pixel; only with Settings::auto_merge.
   bool merges = false;
   std::string why;  ///< reason for the choice, worded as a clause of a message
@@ -104,6 +105,7 @@ struct PilotError {
 struct TransportGain {
   double gain = 0;  ///< efficiency of the best ratio, relative to a render without light paths
   LightPathShare share;
+  CameraPathPart camera;     ///< of the best ratio, without the noisiest pixels
   PilotError with, without;  ///< of the best ratio, and without light paths
 };
 /// Returns the predicted efficiency gain for a render with `longer` times as many samples as the

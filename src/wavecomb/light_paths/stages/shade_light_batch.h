@@ -54,9 +54,9 @@ void shade_light_batch(Wave& wave, const WaveContext& context, const ShadeSettin
           load_row<ConnectionRow, F>(vertices.connections, r.slot, active),
           Mask<F>(load_row<LightVertexRow, F>(vertices.chosen, r.slot, active).depth == U(0u))};
     const Vertex<F, kFeatures> vertex{
-        context.scene, settings, path.key,        depth, hit,
-        r.geom,        r.t,      packet.material, state, aovs.wants_events ? &aovs : nullptr,
-        active};
+        context.scene, settings,     path.key,        depth, hit,
+        r.geom,        r.t,          packet.material, state, aovs.wants_events ? &aovs : nullptr,
+        active,        context.guide};
     const LightVertexResult<F> out = shade_one_of_light<Bsdf, F>(vertex, path.light_state(), setup,
                                                                  connects ? &target : nullptr);
     const VertexResult<F>& v = out.v;

@@ -17,6 +17,8 @@ constexpr std::array<uint32_t, 2> kPilotSeeds = {0x6c078965u, 0x9908b0dfu};
 /// This fraction of the pixels is left out, namely the pixels with the largest differences. A pilot
 /// render has a few hundred pixels, of which a few noisy ones would otherwise determine the result.
 constexpr double kUncounted = 0.02;
+/// Fraction of the paths that is left out of the variance: the paths with the largest differences.
+constexpr double kTrimmedPaths = 0.001;
 /// Number of paths whose vertices are stored at the same time, which takes about 30 MB.
 constexpr size_t kPathsAtOnce = 65'536;
 /// Number of groups of pixels from which log_ratio_error() estimates the error.
@@ -150,6 +152,27 @@ double error_of(const PilotRender& pilot, std::span<const uint32_t> pixels,
     errors[i] = std::isfinite(d) ? d * d : 0;
   }
   return trimmed_mean(errors, kUncounted);
+}
+
+PathStatistics mean_path(const TrainingSamples& training_samples, std::span<const uint32_t> pixels,
+                         const ImageTiles& tiles, std::optional<double> spread) {
+  PathStatistics mean;
+  if (!tiles.is_lit() || pixels.size() < 2) return mean;
+  std::vector<double> variances;
+  variances.reserve(pixels.size());
+  for (size_t i = 0; i + 1 < pixels.size(); ++i) {
+    const PathStatistics& path = training_samples.paths[i];
+    const double scale = tiles.inverse_scale(pixels[i]);
+    const double d =
+        double{training_samples.luminances[i]} - double{training_samples.luminances[i + 1]};
+    const double v = ((spread ? 0 : 0.5 * d * d) + path.variance) * scale * scale;
+    variances.push_back(std::isfinite(v) ? v : 0);
+    mean.cost += path.cost / static_cast<double>(pixels.size() - 1);
+    mean.vertices += path.vertices;
+    mean.survivors += path.survivors;
+  }
+  mean.variance = trimmed_mean(variances, kTrimmedPaths) + spread.value_or(0);
+  return mean;
 }
 
 double log_ratio_error(const PilotRender& a, const PilotRender& b, std::span<const uint32_t> pixels,

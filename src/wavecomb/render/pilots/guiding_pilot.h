@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -64,6 +65,13 @@ PilotRender render_pilot(WaveContext context, Settings settings, const WaveSetup
 /// pixels. Contract: `tiles` are lit.
 double error_of(const PilotRender& pilot, std::span<const uint32_t> pixels,
                 const ImageTiles& tiles);
+
+/// Returns the mean cost and variance of a path, with the effect of roulette, from the paths of the
+/// last round, which were traced from `pixels`. `spread` is the variance without roulette. If
+/// `spread` is empty, the variance is estimated from differences between neighbours, without the
+/// paths that differ most.
+PathStatistics mean_path(const TrainingSamples& training_samples, std::span<const uint32_t> pixels,
+                         const ImageTiles& tiles, std::optional<double> spread);
 
 /// Returns the standard error of the logarithm of error_of(a) / error_of(b), for two pilot renders
 /// of `pixels`, by the jackknife over ten groups of pixels (B. Efron, C. Stein, "The Jackknife

@@ -52,8 +52,6 @@ constexpr double kHopelessGain = 0.8;
 constexpr uint32_t kSpreadSamples = 16;
 /// For learned roulette, one path for every kSpreadShare training paths estimates the variance.
 constexpr uint64_t kSpreadShare = 8;
-/// Fraction of the paths that is left out of the variance: the paths with the largest differences.
-constexpr double kTrimmedPaths = 0.001;
 /// Least measured gains in efficiency for which training continues after the first and the second
 /// round. The render is guided if the gain after the second round, less its standard error, reaches
 /// the second value.
@@ -81,50 +79,25 @@ uint64_t training_paths(const Settings& settings, uint32_t threads) {
   return paths;
 }
 
-/// Returns the mean cost and variance of a path, with the effect of roulette, from the paths of the
-/// last round, which were traced from `pixels`. `spread` is the variance without roulette. If
-/// `spread` is empty, the variance is estimated from differences between neighbours, without the
-/// paths that differ most.
-PathStatistics mean_path(const TrainingSamples& training_samples, std::span<const uint32_t> pixels,
-                         const ImageTiles& tiles, std::optional<double> spread) {
-  PathStatistics mean;
-  if (!tiles.is_lit() || pixels.size() < 2) return mean;
-  std::vector<double> variances;
-  variances.reserve(pixels.size());
-  for (size_t i = 0; i + 1 < pixels.size(); ++i) {
-    const PathStatistics& path = training_samples.paths[i];
-    const double scale = tiles.inverse_scale(pixels[i]);
-    const double d =
-        double{training_samples.luminances[i]} - double{training_samples.luminances[i + 1]};
-    const double v = ((spread ? 0 : 0.5 * d * d) + path.variance) * scale * scale;
-    variances.push_back(std::isfinite(v) ? v : 0);
-    mean.cost += path.cost / static_cast<double>(pixels.size() - 1);
-    mean.vertices += path.vertices;
-    mean.survivors += path.survivors;
-  }
-  mean.variance = trimmed_mean(variances, kTrimmedPaths) + spread.value_or(0);
-  return mean;
-}
-
 /// A training run with all its rounds. For Guiding::kAuto, the class also decides whether training
 /// continues and whether the render uses the guiding field.
 class Trainer {
  public:
-  Trainer(const WaveContext& render, const Scene& scene, const WaveSetup& waves,
-          const std::function<bool()>& stopped)
-      : pilot_settings_(whole_image(*render.settings)),
+  Trainer(const TrainingInput& render, const std::function<bool()>& stopped)
+      : pilot_settings_(whole_image(*render.context.settings)),
         settings_(pilot_settings_),
-        waves_(waves),
-        scene_(scene),
-        samples_(expected_samples(settings_, waves.threads)),
-        budget_(training_paths(settings_, waves.threads)),
+        waves_(render.waves),
+        scene_(render.scene),
+        camera_(render.camera),
+        samples_(expected_samples(settings_, waves_.threads)),
+        budget_(training_paths(settings_, waves_.threads)),
         stopped_(stopped),
-        aovs_(scene, pilot_settings_),
+        aovs_(scene_, pilot_settings_),
         film_(1, 1, aovs_.layout),
-        context_(render),
-        shading_(model_costs(scene)),
+        context_(render.context),
+        shading_(model_costs(scene_)),
         costs_{context_.accel->has_list() ? kListRay : 1.0, guides() ? kGuidedRays : 0, &shading_},
-        grid_(grid_of(scene)),
+        grid_(grid_of(scene_)),
         order_(morton_pixel_order({0, 0, settings_.width, settings_.height})),
         pilot_samples_(std::clamp(settings_.spp, kMinPilotSamples, kMaxPilotSamples)),
         pilot_pixels_(pixels_of_pilot()),
@@ -255,15 +228,20 @@ class Trainer {
   /// Sets the gain in efficiency from two pilot renders of the same pixels.
   void compare(const PilotRender& with, const PilotRender& without) {
     const auto pixels = std::span<const uint32_t>(pilot_pixels_).first(with.differences.size());
-    const double guided_cost = error_of(with, pixels, *tiles_) * with.cost;
-    if (guided_cost > 0 && !ended())
-      statistics_.gain = error_of(without, pixels, *tiles_) * without.cost / guided_cost;
+    const double guided = error_of(with, pixels, *tiles_);
+    const double unguided = error_of(without, pixels, *tiles_);
+    if (guided > 0 && unguided > 0 && with.cost > 0 && !ended())
+      statistics_.gain = camera_.gain(guided / unguided, with.cost / without.cost);
   }
 
   /// Returns the standard error of the logarithm of the gain.
   double log_gain_error(const PilotRender& with, const PilotRender& without) const {
-    const std::span<const uint32_t> pixels = pilot_pixels_;
-    return log_ratio_error(with, without, pixels.first(with.differences.size()), *tiles_);
+    const auto pixels = std::span<const uint32_t>(pilot_pixels_).first(with.differences.size());
+    const double guided = error_of(with, pixels, *tiles_);
+    const double camera = camera_.error * guided;
+    const double light = (1 - camera_.error) * error_of(without, pixels, *tiles_);
+    const double part = camera > 0 ? camera / (camera + light) : 0;
+    return part * log_ratio_error(with, without, pixels, *tiles_);
   }
 
   /// Sets the number of training paths that cost as much as the image. `cost` is the cost of the
@@ -339,6 +317,7 @@ class Trainer {
   Settings settings_;              ///< settings of the training paths
   const WaveSetup waves_;
   const Scene& scene_;
+  const CameraPathPart camera_;
   const uint64_t samples_;  ///< expected number of samples of the render
   uint64_t budget_;         ///< number of training paths
   const std::function<bool()>& stopped_;
@@ -386,15 +365,15 @@ bool needs_training(const Settings& settings) {
   return settings.guiding != Guiding::kOff || settings.roulette == RouletteKind::kEfficient;
 }
 
-GuidingTraining train_guiding(const WaveContext& render, const Scene& scene, const WaveSetup& waves,
-                              const std::function<bool()>& stopped) {
-  const Settings& settings = *render.settings;
+GuidingTraining train_guiding(const TrainingInput& render, const std::function<bool()>& stopped) {
+  const Settings& settings = *render.context.settings;
+  const uint32_t threads = render.waves.threads;
   if (!needs_training(settings) || settings.max_depth == 0) return {};
   const bool is_long_enough = settings.guiding == Guiding::kAuto
-                                  ? expected_samples(settings, waves.threads) >= kMinAutoSamples
-                                  : training_paths(settings, waves.threads) >= kMinTrainingPaths;
+                                  ? expected_samples(settings, threads) >= kMinAutoSamples
+                                  : training_paths(settings, threads) >= kMinTrainingPaths;
   if (!is_long_enough) return {};
-  return Trainer(render, scene, waves, stopped).train();
+  return Trainer(render, stopped).train();
 }
 
 }  // namespace wavecomb

@@ -16,6 +16,7 @@
 #include "wavecomb/core/settings.h"
 #include "wavecomb/guiding/field/field.h"
 #include "wavecomb/guiding/image_tiles.h"
+#include "wavecomb/light_paths/setup.h"
 #include "wavecomb/render/wave_setup.h"
 #include "wavecomb/scene/scene.h"
 
@@ -30,7 +31,7 @@ struct GuidingStatistics {
   uint32_t rounds = 0;
   uint64_t field_bytes = 0;
   /// For Guiding::kAuto: ratio of the efficiency with the field to the efficiency without it,
-  /// measured in pilot renders, or 0 if unknown.
+  /// measured in pilot renders, or 0 if unknown. The efficiency includes light paths.
   double gain = 0;
   /// Expected fraction of vertices at which a path survives learned roulette.
   double survival = 1;
@@ -61,9 +62,17 @@ uint64_t expected_samples(const Settings& settings, uint32_t threads);
 /// Returns whether the settings ask for path guiding or learned roulette.
 bool needs_training(const Settings& settings);
 
-/// Trains the field for a render with `context`, whose lights are calibrated. Gives up if `stopped`
-/// returns true; the result is then invalid.
-GuidingTraining train_guiding(const WaveContext& context, const Scene& scene,
-                              const WaveSetup& waves, const std::function<bool()>& stopped);
+/// Render for which the field is trained.
+struct TrainingInput {
+  const WaveContext& context;  ///< of the render, with calibrated lights
+  const Scene& scene;
+  const WaveSetup& waves;
+  CameraPathPart camera;  ///< of the render without guiding
+};
+
+/// Trains the field for a render. In a render with light paths, training samples have the MIS
+/// weights of its camera paths, so that the field guides to light that light paths do not find.
+/// Gives up if `stopped` returns true; the result is then invalid.
+GuidingTraining train_guiding(const TrainingInput& render, const std::function<bool()>& stopped);
 
 }  // namespace wavecomb

@@ -14,7 +14,12 @@ std::shared_ptr<const GuidingTraining> training_for(const PilotInput& input,
         unpacked_training(input.learned, *input.scene, input.plan.settings));
     if (earlier->statistics.paths > 0) return earlier;
   }
-  return cache.trainings.get(input.scene, context, input.plan.waves, input.stopped);
+  return cache.trainings.get(input.scene,
+                             {.context = context,
+                              .scene = *input.scene,
+                              .waves = input.plan.waves,
+                              .camera = input.camera},
+                             input.stopped);
 }
 
 }  // namespace

@@ -16,10 +16,6 @@ namespace {
 /// Largest fraction of a time limit that pilot renders for the transport may take.
 constexpr double kPilotShare = 0.05;
 
-/// If the predicted gain of light paths reaches this value, guiding is not considered. A smaller
-/// gain is compared with the gain of guiding, because guiding and light paths exclude each other.
-constexpr double kSureGain = 4;
-
 /// Decides the settings that need no pilot render.
 Settings without_open_choices(Settings used) {
   if (used.quality == Quality::kPlain) {
@@ -32,7 +28,8 @@ Settings without_open_choices(Settings used) {
   if (used.transport == Transport::kAuto) return used;
   // Light paths contribute only light that is scattered at least once.
   if (used.max_depth == 0) used.transport = Transport::kPath;
-  if (used.joins_light() && used.guiding == Guiding::kAuto) used.guiding = Guiding::kOff;
+  // The pilot renders of guiding do not connect camera paths to light paths.
+  if (used.connects() && used.guiding == Guiding::kAuto) used.guiding = Guiding::kOff;
   return used;
 }
 
@@ -88,23 +85,6 @@ TransportPilot Planner::render_pilot(const Settings& settings, LightPathShare sh
   return pilot;
 }
 
-double Planner::guiding_gain(Settings settings, const Stopped& stopped) {
-  // Training depends on the whole image only, so rendering one pixel is sufficient.
-  settings.transport = Transport::kPath;
-  settings.region = Region{0, 0, 1, 1};
-  settings.crop = true;
-  settings.aovs = {};
-  settings.light_groups.clear();
-  settings.expressions.clear();
-  const RenderOptions options = pilot_options(stopped);
-  Watch watch(options.interval_s);
-  const RenderPlan plan(*scene_, *accel_, settings, {}, options.policy);
-  RenderRun run(scene_, plan, options, watch, build_s_, {});
-  run.run(cache_, {}, [](const PilotResults&) {});
-  const GuidingStatistics guiding = run.statistics().guiding;
-  return guiding.used ? guiding.gain : 0;
-}
-
 TransportChoice Planner::choose(const Settings& settings, const RenderOptions& options,
                                 const Stopped& abandoned) {
   if (!options.learned.empty()) {
@@ -131,22 +111,12 @@ TransportChoice Planner::choose(const Settings& settings, const RenderOptions& o
         settings.time_limit > 0 && seconds_since(start) > kPilotShare * settings.time_limit;
     return is_late || abandoned();
   };
-  TransportChoice choice = choose_transport(
+  const TransportChoice choice = choose_transport(
       *scene_, settings, expected_samples(settings, thread_count(settings)),
       [&](const Settings& s, LightPathShare share, bool squares) {
         return render_pilot(s, share, squares, shared, stopped);
       },
       stopped);
-  const bool may_guide = settings.guiding == Guiding::kAuto && choice.gain < kSureGain;
-  if (choice.transport == Transport::kLight && may_guide) {
-    const double gain = guiding_gain(settings, stopped);
-    if (gain >= choice.gain) {
-      choice.transport = Transport::kPath;
-      choice.merges = false;
-      choice.why += ", since guiding is expected to gain more";
-    }
-    choice.seconds = seconds_since(start);
-  }
   if (!abandoned()) cache_.transports.keep(scene_, settings, choice);
   return choice;
 }

@@ -4,10 +4,8 @@
 /// 1. Settings that need no measurement are decided first, such as plain quality.
 /// 2. Small renders of the whole view compare ratios of light paths (transport_choice.h in
 ///    light_paths/render).
-/// 3. If the predicted gain of light paths is small, guiding is trained as well. The technique with
-///    the larger predicted gain is used, because guiding and light paths exclude each other.
-/// 4. The pilots of the render with the decided settings follow (pilots.h). They decide whether
-///    to use guiding, and measure lights, material costs and directions for light paths.
+/// 3. The pilots of the render with the decided settings follow (pilots.h). They decide whether to
+///    guide its camera paths, and measure lights, material costs and directions for light paths.
 ///
 /// Decisions depend only on counted samples of the whole image, and never on seed, region, threads
 /// or the clock, so that tiles, crops, resumed renders and merged renders make the same decisions.
@@ -55,9 +53,6 @@ class Planner {
   /// Renders a small image for choose_transport().
   TransportPilot render_pilot(const Settings& settings, LightPathShare share, bool wants_squares,
                               const PilotShared& shared, const Stopped& stopped);
-  /// Returns the predicted gain of path guiding for `settings` without light paths, or 0 if guiding
-  /// would not be used.
-  double guiding_gain(Settings settings, const Stopped& stopped);
 
   std::shared_ptr<const Scene> scene_;
   std::shared_ptr<const EmbreeAccelerator> accel_;

@@ -15,7 +15,7 @@ namespace wavecomb {
 namespace {
 
 /// Version of the packed format. Increase this version when the format changes.
-constexpr uint32_t kCacheFormat = 4;
+constexpr uint32_t kCacheFormat = 5;
 
 class ByteWriter {
  public:
@@ -105,6 +105,7 @@ void pass_parts(Archive& archive, Parts& parts) {
 struct PackedChoice {
   uint8_t is_there = 0, uses_light = 0, merges = 0;
   int32_t share = 0;  ///< exponent of LightPathShare
+  CameraPathPart camera;
   double gain = 0;
 };
 
@@ -114,6 +115,7 @@ void pass_choice(Archive& archive, Choice& choice) {
   archive.value(choice.uses_light);
   archive.value(choice.merges);
   archive.value(choice.share);
+  archive.value(choice.camera);
   archive.value(choice.gain);
 }
 
@@ -172,8 +174,12 @@ std::vector<std::byte> packed_training(const GuidingTraining& training,
   writer.value(kCacheFormat);
   PackedChoice choice;
   if (transport)
-    choice = {1, uint8_t{transport->transport == Transport::kLight}, uint8_t{transport->merges},
-              transport->share.exponent, transport->gain};
+    choice = {1,
+              uint8_t{transport->transport == Transport::kLight},
+              uint8_t{transport->merges},
+              transport->share.exponent,
+              transport->camera,
+              transport->gain};
   pass_choice(writer, choice);
   writer.value(uint8_t{training.statistics.paths > 0});
   if (training.statistics.paths == 0) return writer.take();
@@ -225,6 +231,8 @@ TransportChoice unpacked_transport(std::span<const std::byte> bytes) {
     choice.transport = Transport::kLight;
     choice.share.exponent = std::clamp(packed.share, -8, 8);
     choice.merges = packed.merges != 0;
+    const auto part = [](double x) { return x >= 0 && x <= 1 ? x : 1; };
+    choice.camera = {part(packed.camera.error), part(packed.camera.cost)};
   }
   choice.gain = std::isfinite(packed.gain) ? std::max(0.0, packed.gain) : 0;
   return choice;
@@ -246,10 +254,12 @@ void TransportChoiceCache::keep(const std::shared_ptr<const Scene>& scene, const
 }
 
 std::shared_ptr<const GuidingTraining> GuidingTrainingCache::get(
-    const std::shared_ptr<const Scene>& scene, const WaveContext& context, const WaveSetup& waves,
+    const std::shared_ptr<const Scene>& scene, const TrainingInput& render,
     const std::function<bool()>& stopped) {
-  const Settings settings = training_settings(*context.settings);
-  if (last_ && scene_.lock() == scene && settings_ == settings) {
+  const Settings settings = training_settings(*render.context.settings);
+  const float light_share = render.context.joint.share;
+  if (last_ && scene_.lock() == scene && settings_ == settings && camera_ == render.camera &&
+      light_share_ == light_share) {
     if (!last_->statistics.is_reused) {
       auto reused = std::make_shared<GuidingTraining>(*last_);
       reused->statistics.is_reused = true;
@@ -258,11 +268,12 @@ std::shared_ptr<const GuidingTraining> GuidingTrainingCache::get(
     }
     return last_;
   }
-  auto trained =
-      std::make_shared<const GuidingTraining>(train_guiding(context, *scene, waves, stopped));
+  auto trained = std::make_shared<const GuidingTraining>(train_guiding(render, stopped));
   if (trained->statistics.paths > 0 && !stopped()) {
     last_ = trained;
     settings_ = settings;
+    camera_ = render.camera;
+    light_share_ = light_share;
     scene_ = scene;
   }
   return trained;

@@ -58,12 +58,14 @@ class GuidingTrainingCache {
  public:
   /// Returns the cached training, or calls train_guiding().
   std::shared_ptr<const GuidingTraining> get(const std::shared_ptr<const Scene>& scene,
-                                             const WaveContext& context, const WaveSetup& waves,
+                                             const TrainingInput& render,
                                              const std::function<bool()>& stopped);
 
  private:
   std::weak_ptr<const Scene> scene_;
   Settings settings_;
+  CameraPathPart camera_;
+  float light_share_ = 0;  ///< LightPathContext::share
   std::shared_ptr<const GuidingTraining> last_;
 };
 
