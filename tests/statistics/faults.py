@@ -108,6 +108,17 @@ FAULTS = (
             ),
         ),
     ),
+    Fault(
+        "light paths take the bounces of guided camera paths for unguided ones",
+        1,
+        (
+            (
+                CORE + "light_paths/camera_density.h",
+                "if (!v.guide) [[likely]]",
+                "if (!v.guide || v.depth < 1000) [[likely]]",
+            ),
+        ),
+    ),
 )
 
 

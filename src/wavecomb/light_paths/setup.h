@@ -29,21 +29,6 @@ struct LightPathShare {
   }
 };
 
-/// Parts of a render's squared error and cost that its camera paths cause, as fractions. Light
-/// paths cause the rest.
-struct CameraPathPart {
-  double error = 1, cost = 1;
-
-  /// Returns the efficiency of a render in which the squared error and the cost of camera paths
-  /// change by these factors, relative to the efficiency of the render without these changes.
-  double gain(double error_factor, double cost_factor) const {
-    return 1 / ((1 + error * (error_factor - 1)) * (1 + cost * (cost_factor - 1)));
-  }
-  bool operator==(const CameraPathPart&) const = default;
-};
-/// Part that is assumed for renders with light paths whose errors were not measured.
-inline constexpr CameraPathPart kUnknownCameraPart = {0.5, 0.5};
-
 /// Returns a feature of the scene that light paths do not support; the result is empty if there is
 /// none.
 LightPathConflict light_path_conflict(const Scene& scene);

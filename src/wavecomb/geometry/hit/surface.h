@@ -139,14 +139,13 @@ WAVECOMB_INLINE void set_triangle_uv(const SceneView& scene, const MeshHit<F>& h
   s.dpdu = maps.vector(tangent);
 }
 
-/// Computes setup_surface(). `kWithCurves` may be false for scenes without curves, and
-/// `kWithMotion` for scenes without motion.
-template <typename F, bool kWithCurves, bool kWithMotion>
+/// Computes setup_surface(). `kIsGeneral` may be false for scenes without curves and motion.
+template <typename F, bool kIsGeneral>
 WAVECOMB_INLINE Surface<F> compute_surface(const SceneView& scene, const MeshHit<F>& hit,
                                            const Vec3<F>& dir, bool with_uv, bool with_terminator,
                                            const Mask<F>& lanes) {
   Mask<F> active = lanes;
-  if (kWithCurves && scene.has_curves) active = active & not_(is_curved<F>(scene, hit.mesh, lanes));
+  if (kIsGeneral && scene.has_curves) active = active & not_(is_curved<F>(scene, hit.mesh, lanes));
   const MeshReader<F> mesh(scene.meshes, hit.mesh, active);
   InstanceMaps<F> maps(scene.instances, hit.inst, active);
   const auto [i0, i1, i2] = mesh.corners(hit.prim, active);
@@ -154,7 +153,7 @@ WAVECOMB_INLINE Surface<F> compute_surface(const SceneView& scene, const MeshHit
   Vec3<F> p1 = mesh.vec3(&MeshRecord::positions, i1, active);
   Vec3<F> p2 = mesh.vec3(&MeshRecord::positions, i2, active);
   F moved_size(0.f);
-  if (kWithMotion && scene.has_motion) [[unlikely]] {
+  if (kIsGeneral && scene.has_motion) [[unlikely]] {
     const MovedTriangle<F> moved =
         moved_triangle<F>(scene, hit.inst, hit.mesh, {i0, i1, i2}, hit.time, maps, active);
     p0 = moved.p[0];
@@ -189,20 +188,20 @@ WAVECOMB_INLINE Surface<F> compute_surface(const SceneView& scene, const MeshHit
   s.offset = rounding_offset<F>(maps, at);
   // Interpolation between motion steps adds rounding errors in proportion to the coordinates at
   // both steps.
-  if (kWithMotion && scene.has_motion) [[unlikely]]
+  if (kIsGeneral && scene.has_motion) [[unlikely]]
     s.offset = max(s.offset, F(moved_size * 0x1.4p-20f));
 
   s.ns = s.ng;
   s.terminator = Vec3<F>(F(0.f));
   const Mask<F> smooth = has_normals(mesh) & active;
   if (any(smooth))
-    set_smooth_normal<kWithMotion, F>(scene, hit, mesh, maps, at, {smooth, with_terminator}, s);
+    set_smooth_normal<kIsGeneral, F>(scene, hit, mesh, maps, at, {smooth, with_terminator}, s);
   s.uv = {b1, b2};
   s.dpdu = Vec3<F>(F(0.f));
   s.handedness = maps.side;
   s.uv_per_length = F(0.f);
   if (with_uv) set_triangle_uv<F>(scene, hit, mesh, maps, at, active, s);
-  if (kWithCurves && scene.has_curves) {
+  if (kIsGeneral && scene.has_curves) {
     const Mask<F> curved = lanes & not_(active);
     if (any(curved)) setup_curved<F>(scene, hit, dir, with_uv, curved, s);
   }
@@ -226,7 +225,7 @@ WAVECOMB_INLINE Surface<F> compute_surface(const SceneView& scene, const MeshHit
 template <typename F>
 Surface<F> setup_surface(const SceneView& scene, const MeshHit<F>& hit, const Vec3<F>& dir,
                          bool with_uv, bool with_terminator, const Mask<F>& lanes) {
-  return detail::compute_surface<F, true, true>(scene, hit, dir, with_uv, with_terminator, lanes);
+  return detail::compute_surface<F, true>(scene, hit, dir, with_uv, with_terminator, lanes);
 }
 
 /// Returns setup_surface() for scenes without curves and motion, inlined.
@@ -234,7 +233,7 @@ template <typename F>
 WAVECOMB_INLINE Surface<F> setup_plain_surface(const SceneView& scene, const MeshHit<F>& hit,
                                                const Vec3<F>& dir, bool with_uv,
                                                bool with_terminator, const Mask<F>& lanes) {
-  return detail::compute_surface<F, false, false>(scene, hit, dir, with_uv, with_terminator, lanes);
+  return detail::compute_surface<F, false>(scene, hit, dir, with_uv, with_terminator, lanes);
 }
 
 /// Returns |cos| of the angle between a ray along `dir` and the shading normal before its

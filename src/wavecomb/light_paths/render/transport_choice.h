@@ -33,6 +33,7 @@
 
 #include "wavecomb/core/settings.h"
 #include "wavecomb/light_paths/setup.h"
+#include "wavecomb/render/camera_path_part.h"
 #include "wavecomb/scene/scene.h"
 
 namespace wavecomb {

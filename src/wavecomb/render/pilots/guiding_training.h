@@ -16,7 +16,7 @@
 #include "wavecomb/core/settings.h"
 #include "wavecomb/guiding/field/field.h"
 #include "wavecomb/guiding/image_tiles.h"
-#include "wavecomb/light_paths/setup.h"
+#include "wavecomb/render/camera_path_part.h"
 #include "wavecomb/render/wave_setup.h"
 #include "wavecomb/scene/scene.h"
 
