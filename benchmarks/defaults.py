@@ -62,17 +62,28 @@ TUNING = {
 }
 VALIDATION = {
     "room-7": Stage("room", "guided", {"seed": 7, "plain": True}),
+    "room-11": Stage("room", "guided", {"seed": 11, "plain": True}),
+    "room-23": Stage("room", "guided", {"seed": 23, "plain": True}),
     "kitchen-3": Stage("kitchen", options={"seed": 3, "plain": True}),
+    "kitchen-5": Stage("kitchen", options={"seed": 5, "plain": True}),
     "glass-dragon": Stage("cornell-dragon", "light", {"material": "glass"}),
     "gold-dragon": Stage("cornell-dragon", options={"material": "gold"}),
+    "copper-dragon": Stage("cornell-dragon", options={"material": "copper"}),
     "dragon-lamps": Stage("dragon", options=PLAIN_LAMPS),
+    "dragon": Stage("dragon", options={"plain": True}),
+    "mixed-7": Stage("mixed", options={"seed": 7, "plain": True}),
     "spread": Stage("spread"),
+    "spread-4": Stage("spread", options={"seed": 4}),
     "pool": Stage("pool", "light"),
+    "prism": Stage("prism", "light"),
     "landscape": Stage("landscape", "light"),
     "drinks": Stage("drinks"),
+    "clouds": Stage("clouds"),
     "candles": Stage("candles"),
     "head": Stage("head", options={"strands": 20_000}),
+    "head-2": Stage("head", options={"seed": 2, "strands": 20_000}),
     "lights-5": Stage("lights", options={"seed": 5, "lights": 1000}),
+    "lights-9": Stage("lights", options={"seed": 9, "lights": 1000}),
 }
 STAGES = TUNING | VALIDATION
 SETS = {"@tuning": list(TUNING), "@validation": list(VALIDATION)}

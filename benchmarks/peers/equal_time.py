@@ -45,7 +45,9 @@ UNLIKE = {
     "candles": "wax with subsurface scattering",
     "drinks": "liquids with media",
     "fog": "a medium",
+    "clouds": "a volume",
     "head": "skin with subsurface scattering, and hair",
+    "head-2": "skin with subsurface scattering, and hair",
     "fur": "hair",
 }
 """Stages that mitsuba_bridge.py and cycles_bridge.py cannot translate, so images would differ."""
