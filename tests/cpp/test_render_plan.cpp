@@ -81,6 +81,7 @@ TEST(Pilots, FindWhatARenderNeedsAndKeepIt) {
                                      .context = context,
                                      .costs = costs,
                                      .light_settings = settings,
+                                     .camera = {},
                                      .learned = {},
                                      .joint = nullptr,
                                      .stopped = no,

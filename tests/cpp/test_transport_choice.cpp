@@ -75,6 +75,25 @@ TEST(TransportGain, IsTheRatioOfVariancesByCosts) {
   EXPECT_NEAR(gain.gain, 4 * path / (2 * 2 * joint), 0.15);
 }
 
+TEST(TransportGain, SeparatesThePartOfCameraPaths) {
+  // Light paths have the variance 0.01 / share, and cost as much as camera paths.
+  const TransportGain many = gain_of(0.1f * std::sqrt(3.f), 0.1f, 0.1f);
+  EXPECT_EQ(many.share.exponent, 0);
+  EXPECT_NEAR(many.camera.error, 0.5, 0.05);
+  EXPECT_NEAR(many.camera.cost, 0.5, 1e-6);
+  const TransportGain few = gain_of(0.5f, 0.3f, 0.01f);
+  EXPECT_EQ(few.share.exponent, -3);
+  EXPECT_NEAR(few.camera.error, 1 / (1 + 8 * 0.01 * 0.01 / (0.3 * 0.3)), 0.02);
+  EXPECT_NEAR(few.camera.cost, 8.0 / 9, 1e-6);
+}
+
+TEST(CameraPathPart, DilutesWhatGuidingGains) {
+  const CameraPathPart whole, half = {0.5, 0.5};
+  EXPECT_DOUBLE_EQ(whole.gain(0.25, 1.6), 1 / (0.25 * 1.6));
+  EXPECT_DOUBLE_EQ(half.gain(0.5, 1.5), 1 / (0.75 * 1.25));
+  EXPECT_DOUBLE_EQ(half.gain(1, 1), 1);
+}
+
 TEST(TransportGain, CountsWhatMergingCosts) {
   TransportPilots pilots = trials_of(0.1f, 0.1f, 0.1f, 1);
   const double gain = transport_gain(pilots, work_without(pilots), 8).gain;
