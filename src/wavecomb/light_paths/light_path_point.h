@@ -23,7 +23,7 @@ struct LightPathPoint {
   Vec3<F> l;      ///< direction to the light in the shading frame (see light_paths/connection.h)
   F inverse_cos;  ///< 1 / |g l|
   Color<F> flux;  ///< flux that arrives at the vertex
-  F connection_density;   ///< term F = d^2 / p<- (see the top of the file)
+  F connection_density;   ///< term F = d^2 / p<- (light_vertex.h)
   F sampled;              ///< density of light samples at the first vertex; 0 at later vertices
   Mask<F> by_light_only;  ///< lanes with a light that bounces cannot hit
   Mask<F> active;
