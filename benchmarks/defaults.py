@@ -97,10 +97,6 @@ WAYS: dict[str, dict[str, Any]] = {
     "light": {"guiding": "off", "transport": "light"},
     "light-auto": {"guiding": "off", "transport": "auto"},
     "merged": {"guiding": "off", "transport": "light", "merge_radius": 1.0},
-    "guided light-auto": {"guiding": "on", "transport": "auto"},
-    "efficiency": {"guiding": "off", "transport": "path", "allocate": "efficiency"},
-    "guided+efficiency": {"guiding": "on", "transport": "path", "allocate": "efficiency"},
-    "light+efficiency": {"guiding": "off", "transport": "light", "allocate": "efficiency"},
 }
 COMBINATIONS = {
     f"{guiding} {transport} {allocate}": {"guiding": guiding, "allocate": allocate} | settings
@@ -115,6 +111,7 @@ COMBINATIONS = {
 }
 """All combinations of guiding, light paths and allocation; merging needs even allocation."""
 WAYS |= COMBINATIONS
+SETS["@combinations"] = list(COMBINATIONS)
 PERCENTILES = (50, 90, 99, 99.9)
 
 
@@ -247,8 +244,7 @@ def main() -> None:
     parser.add_argument("--output", type=Path, default=RESULTS / "defaults.json")
     options = parser.parse_args()
     names = [name for given in options.stages for name in SETS.get(given, [given])]
-    sets = {"@combinations": list(COMBINATIONS)}
-    options.ways = [way for given in options.ways for way in sets.get(given, [given])]
+    options.ways = [way for given in options.ways for way in SETS.get(given, [given])]
     rows: list[dict[str, Any]] = []
     for name in names:
         for spp in options.spp:

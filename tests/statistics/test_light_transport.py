@@ -361,9 +361,7 @@ def test_delta_lobes_of_guided_paths(tmp_path: Path, beauty: Any) -> None:
     stage = wavecomb.load(path)
     settings: dict[str, Any] = {"max_depth": 4, "transport": "light"}
     plain = {"filter": "box", "filter_width": 1.0, "sampler": "independent", "roulette": "off"}
-    trained = wavecomb.render(
-        stage, size=(32, 32), spp=1024, guiding="on", **plain, **settings
-    )  # fmt: skip
+    trained = wavecomb.render(stage, size=(32, 32), spp=1024, guiding="on", **plain, **settings)
     assert trained.stats["guiding"]["guided_share"] > 0.5
     guided, alone = (
         batches(
