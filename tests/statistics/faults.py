@@ -114,8 +114,9 @@ FAULTS = (
         (
             (
                 CORE + "light_paths/camera_density.h",
-                "if (!v.guide) [[likely]]",
-                "if (!v.guide || v.depth < 1000) [[likely]]",
+                "return {mixed_pdf<Bsdf, F>(v, guiding, frame.to_world(l), l, w, p_bsdf), "
+                "guiding.bsdf_share};",
+                "return {v.depth < 1000 ? p_bsdf : F(0.f), guiding.bsdf_share};",
             ),
         ),
     ),

@@ -16,8 +16,8 @@ namespace wavecomb {
 template <typename F>
 struct CameraBounce {
   F pdf;  ///< density p-> of the bounce towards the light
-  /// Probability that the BSDF samples the bounce; a factor of the selection probability of delta
-  /// lobes.
+  /// Probability that the BSDF samples the bounce, as in GuidingLookup. The selection probability
+  /// of a delta lobe is that of the BSDF times this value.
   F bsdf_share;
 };
 
@@ -27,11 +27,8 @@ template <typename Bsdf, typename F, uint32_t kFeatures, typename Interaction>
 WAVECOMB_INLINE CameraBounce<F> camera_bounce(const Vertex<F, kFeatures>& v, const Interaction& at,
                                               const Frame<F>& frame, const Vec3<F>& w,
                                               const Vec3<F>& l, const F& p_bsdf) {
-  if (!v.guide) [[likely]]
-    return {p_bsdf, F(1.f)};
   const GuidingLookup<F> guiding = guiding_lookup<Bsdf, F>(v, at, frame, w);
-  return {mixed_pdf<Bsdf, F>(v, guiding, frame.to_world(l), l, w, p_bsdf),
-          select(guiding.guided, guiding.bsdf_share, F(1.f))};
+  return {mixed_pdf<Bsdf, F>(v, guiding, frame.to_world(l), l, w, p_bsdf), guiding.bsdf_share};
 }
 
 }  // namespace wavecomb

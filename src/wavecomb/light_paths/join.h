@@ -203,9 +203,7 @@ WAVECOMB_INLINE F next_ratio(const Context& c, const JointVertex<F>& joint, bool
   if (any(b.is_delta)) {
     const F z = abs(b.wi.z) * F(b.eta * b.eta);
     F by_angle = joint.ratio * F(abs(dot(at.s.ng, world)) * joint.inverse_cos) *
-                 F(abs(wo.z) / select(z > 0.f, z, F(1.f)));
-    if (v.guide) [[unlikely]]
-      by_angle = by_angle / select(c.guide.guided, c.guide.bsdf_share, F(1.f));
+                 F(abs(wo.z) / select(z > 0.f, z, F(1.f))) / c.guide.bsdf_share;
     by_angle = select(is_asymmetric<Bsdf, F>(at.bsdf, wo, b.wi), F(0.f), by_angle);
     r = select(b.is_delta, v.depth == 0 ? F(0.f) : by_angle, r);
   }

@@ -58,7 +58,7 @@ class RenderRun {
  private:
   /// Fills the film from a checkpoint, if there is one. Returns the state of the checkpoint's pass.
   PassState resume();
-  /// Returns the part of camera paths in the error and cost of the render without guiding.
+  /// Returns the fractions of error and cost that camera paths cause in the render without guiding.
   CameraPathPart camera_part() const;
   void work(PilotCache& cache, const PilotShared& shared,
             const std::function<void(const PilotResults&)>& learned);

@@ -33,6 +33,7 @@ WAVECOMB_INLINE GuidingLookup<F> guiding_lookup(const Vertex<F, kFeatures>& v,
       GuidingLookup<F> guiding =
           look_up_guiding<F>(*v.guide, p, guiding_axis<F>(n), v.material, v.active);
       guiding.guided = guiding.guided & at.bsdf.has_non_delta();
+      guiding.bsdf_share = select(guiding.guided, guiding.bsdf_share, F(1.f));
       return guiding;
     }
   }

@@ -124,6 +124,18 @@ double ratio_of(double a, double b) {
 /// Squared relative noise of each pixel.
 using PixelNoise = std::vector<double>;
 
+/// Returns the noise of two images with different seeds. `scale` holds 1 / brightness^2 for each
+/// pixel.
+PixelNoise noise_between(const std::vector<float>& a, const std::vector<float>& b,
+                         const std::vector<double>& scale) {
+  PixelNoise noise(scale.size());
+  for (size_t i = 0; i < noise.size(); ++i) {
+    const double d = double{brightness(a, i)} - double{brightness(b, i)};
+    noise[i] = 0.5 * scale[i] * (d * d);
+  }
+  return noise;
+}
+
 double sum(const PixelNoise& noise) {
   return std::accumulate(noise.begin(), noise.end(), 0.0);
 }
@@ -183,14 +195,7 @@ TransportGain transport_gain(const TransportPilots& pilots, const PilotWork& wit
   for (size_t k = 0; k < kCandidateShares.size(); ++k) {
     const auto& with = pilots.with[k];
     if (!is_candidate(with)) continue;
-    PixelNoise noise(pixels), by_light(pixels);
-    for (size_t i = 0; i < pixels; ++i) {
-      const auto noise_of = [&](const std::vector<float>& a, const std::vector<float>& b) {
-        return 0.5 * scale[i] * squared(double{brightness(a, i)} - brightness(b, i));
-      };
-      noise[i] = noise_of(with[0].beauty, with[1].beauty);
-      by_light[i] = noise_of(with[0].by_light_paths, with[1].by_light_paths);
-    }
+    PixelNoise noise = noise_between(with[0].beauty, with[1].beauty, scale);
     const PilotWork work = work_of(with);
     double cost = work.cost(kJointVertex);
     if (pilots.merges)
@@ -200,7 +205,8 @@ TransportGain transport_gain(const TransportPilots& pilots, const PilotWork& wit
     error.all = sum(noise) * cost;
     const double noise_of_most = sum_of_most(std::move(noise));
     error.of_most = noise_of_most * cost;
-    const double light_of_most = sum_of_most(std::move(by_light));
+    const double light_of_most =
+        sum_of_most(noise_between(with[0].by_light_paths, with[1].by_light_paths, scale));
     const double light_cost = std::max(0.0, cost - without.cost(kJointVertex));
     const double gain = std::max(ratio_of(best.without.all, error.all),
                                  ratio_of(best.without.of_most, error.of_most));

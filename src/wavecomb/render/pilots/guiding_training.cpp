@@ -228,20 +228,23 @@ class Trainer {
   /// Sets the gain in efficiency from two pilot renders of the same pixels.
   void compare(const PilotRender& with, const PilotRender& without) {
     const auto pixels = std::span<const uint32_t>(pilot_pixels_).first(with.differences.size());
-    const double guided = error_of(with, pixels, *tiles_);
+    const double factor = error_factor(with, without, pixels);
+    if (factor > 0 && with.cost > 0 && !ended())
+      statistics_.gain = camera_.gain(factor, with.cost / without.cost);
+  }
+
+  /// Returns the factor by which guiding changes the squared error, or 0 if it is not known.
+  double error_factor(const PilotRender& with, const PilotRender& without,
+                      std::span<const uint32_t> pixels) const {
     const double unguided = error_of(without, pixels, *tiles_);
-    if (guided > 0 && unguided > 0 && with.cost > 0 && !ended())
-      statistics_.gain = camera_.gain(guided / unguided, with.cost / without.cost);
+    return unguided > 0 ? error_of(with, pixels, *tiles_) / unguided : 0;
   }
 
   /// Returns the standard error of the logarithm of the gain.
   double log_gain_error(const PilotRender& with, const PilotRender& without) const {
     const auto pixels = std::span<const uint32_t>(pilot_pixels_).first(with.differences.size());
-    const double guided = error_of(with, pixels, *tiles_);
-    const double camera = camera_.error * guided;
-    const double light = (1 - camera_.error) * error_of(without, pixels, *tiles_);
-    const double part = camera > 0 ? camera / (camera + light) : 0;
-    return part * log_ratio_error(with, without, pixels, *tiles_);
+    return camera_.error_after(error_factor(with, without, pixels)) *
+           log_ratio_error(with, without, pixels, *tiles_);
   }
 
   /// Sets the number of training paths that cost as much as the image. `cost` is the cost of the

@@ -71,8 +71,8 @@ struct TrainingInput {
 };
 
 /// Trains the field for a render. In a render with light paths, training samples have the MIS
-/// weights of its camera paths, so that the field guides to light that light paths do not find.
-/// Gives up if `stopped` returns true; the result is then invalid.
+/// weights of its camera paths, so that the field guides them to light that light paths do not
+/// find. Gives up if `stopped` returns true; the result is then invalid.
 GuidingTraining train_guiding(const TrainingInput& render, const std::function<bool()>& stopped);
 
 }  // namespace wavecomb

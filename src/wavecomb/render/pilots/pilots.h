@@ -63,7 +63,7 @@ struct PilotInput {
   /// Settings of the image for which lights are calibrated: the plan's settings or, in a pilot
   /// render, the settings of the actual render.
   const Settings& light_settings;
-  /// Part of camera paths in the error and cost of the render without guiding.
+  /// Fractions of the error and cost that camera paths cause in the render without guiding.
   CameraPathPart camera;
   /// Packed training of an earlier render (packed_training()), used instead of new training; may be
   /// empty.
