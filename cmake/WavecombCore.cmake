@@ -112,7 +112,7 @@ function(wavecomb_kernel_units var kind set width)
       set(unit "${PROJECT_BINARY_DIR}/lanes/${kind}_${member}_${width}.cpp")
       configure_file("${template}" "${unit}" @ONLY)
       # With WAVECOMB_BATCH, all kernels of a program and lane width are compiled as one unit.
-      set_source_files_properties("${unit}" PROPERTIES UNITY_GROUP "${program}")
+      set_source_files_properties("${unit}" PROPERTIES UNITY_GROUP "${program}_${width}")
       list(APPEND units "${unit}")
     endif()
     math(EXPR index "${index} + 1")
