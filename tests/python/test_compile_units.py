@@ -110,6 +110,22 @@ def test_a_program_is_in_its_own_units_alone(units_of: dict[str, set[str]], prog
         assert included and all(unit.endswith(f"_{width}.cpp") for unit in included)
 
 
+def test_kernels_of_all_lane_widths_are_separate_units(tmp_path: Path) -> None:
+    # make test compiles two widths only. Each unit defines WAVECOMB_LANES, so that a unity file of
+    # two widths does not compile.
+    cmake = Path(sys.executable).with_name("cmake")
+    if not cmake.exists():
+        not_here("the library was not built by make build")
+    options = ["-DWAVECOMB_LANE_WIDTHS=all", "-DWAVECOMB_BATCH=ON", "--log-level=ERROR"]
+    subprocess.run([cmake, "-S", ROOT, "-B", tmp_path, "-G", "Ninja", *options], check=True)
+    included: dict[str, set[str]] = defaultdict(set)
+    for path in tmp_path.glob("CMakeFiles/wavecomb_core_*.dir/Unity/unity_*_cxx.cxx"):
+        for width in re.findall(r'^#include ".*/lanes/.*_(\d+)\.cpp"', path.read_text(), re.MULTILINE):
+            included[path.name].add(width)
+    assert {"1", "4"} <= set.union(*included.values())
+    assert all(len(widths) == 1 for widths in included.values()), included
+
+
 BODIES = ("guiding/lookup.inl", "graph/run.inl", "material/inputs/graph_inputs.inl",
           "texture/lookup.inl", "material/inputs/inputs.inl", "geometry/hit/motion.inl",
           "light/sampling/light_sample.inl", "light/emission/emission.inl",
