@@ -18,8 +18,8 @@ target_compile_options(wavecomb_common INTERFACE
   # In code for one lane, masks have the type bool, and kernels combine masks with & and |.
   $<$<CXX_COMPILER_ID:Clang,AppleClang>:-Wno-bitwise-instead-of-logical>
   # GCC 12 gives false warnings about uninitialized and out-of-bounds vectors for inlined SIMD
-  # intrinsics.
-  $<$<AND:$<CXX_COMPILER_ID:GNU>,$<VERSION_LESS:$<CXX_COMPILER_VERSION>,13>>:-Wno-maybe-uninitialized;-Wno-uninitialized;-Wno-array-bounds;-Wno-stringop-overflow;-Wno-stringop-overread>
+  # intrinsics, and about overlapping strings.
+  $<$<AND:$<CXX_COMPILER_ID:GNU>,$<VERSION_LESS:$<CXX_COMPILER_VERSION>,13>>:-Wno-maybe-uninitialized;-Wno-uninitialized;-Wno-array-bounds;-Wno-restrict;-Wno-stringop-overflow;-Wno-stringop-overread>
   # Without this parameter, GCC collects garbage so often that compiling takes 5 to 10 % longer. No
   # unit needs more than 1 GB of memory either way.
   $<$<CXX_COMPILER_ID:GNU>:--param=ggc-min-heapsize=1000000>
