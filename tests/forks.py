@@ -113,10 +113,8 @@ def _read_at_import(variables: Mapping[str, str]) -> dict[str, str]:
     return {name: value for name, value in variables.items() if name not in HARMLESS}
 
 
-class Popen(_Popen):
-    """A `subprocess.Popen` that lets the server fork the process if the result is the same."""
-
-    _told: socket.socket | None = None
+class _OwnStart(_Popen):
+    """A `subprocess.Popen` that starts some processes in another way, given by `_start`."""
 
     def _execute_child(
         self, args: Any, executable: Any, preexec_fn: Any, close_fds: Any, pass_fds: Any,
@@ -124,30 +122,55 @@ class Popen(_Popen):
         p2cread: int, p2cwrite: int, c2pread: int, c2pwrite: int, errread: int, errwrite: int,
         *more: Any,
     ) -> None:  # fmt: skip
-        *_, session = more[:6]  # restore_signals, gid, gids, uid, umask, start_new_session
-        variables = {str(k): str(v) for k, v in (os.environ if env is None else env).items()}
         words = [] if isinstance(args, (str, bytes)) else [str(word) for word in args]
-        request = {"words": words[1:], "env": variables, "cwd": os.fspath(cwd or os.getcwd()),
-                   "numbers": [0, 1, 2, *pass_fds], "session": bool(session)}  # fmt: skip
-        plain = _is_plain(preexec_fn, shell, executable, more)
-        server = _started() if plain and _is_python(words) else None
-        if server is None or not server.serves(variables) or len(json.dumps(request)) > _MOST:
+        # `more`: restore_signals, gid, gids, uid, umask, start_new_session, process_group
+        is_plain = not (preexec_fn or shell or executable or any(more[1:4]) or more[6:] > (-1,))
+        given, own = (p2cread, c2pwrite, errwrite), (p2cwrite, c2pread, errread)
+        pid = 0
+        if is_plain and _is_python(words):
+            pid = self._start(words, given, pass_fds, cwd, env, bool(more[5]))
+        if pid == 0:
             super()._execute_child(
                 args, executable, preexec_fn, close_fds, pass_fds, cwd, env, startupinfo,
                 creationflags, shell, p2cread, p2cwrite, c2pread, c2pwrite, errread, errwrite,
                 *more,
             )  # fmt: skip
             return
-        given = (p2cread, c2pwrite, errwrite)
-        streams = [number if end == -1 else end for number, end in enumerate(given)]
-        self._told = server.fork(request, [*streams, *pass_fds])
+        self.pid = pid
         self._child_created = True
-        self.pid = int(self._told.recv(64))
-        own = (p2cwrite, c2pread, errread)
         shut = {end for end, mine in zip(given, own, strict=True) if end != -1 and mine != -1}
-        nothing = getattr(self, "_devnull", None)
-        for end in shut | ({nothing} - {None}):
+        for end in shut | ({getattr(self, "_devnull", None)} - {None}):
             os.close(end)
+
+    def _start(
+        self, words: Sequence[str], streams: Sequence[int], pass_fds: Sequence[int], cwd: Any,
+        env: Any, session: bool,
+    ) -> int:  # fmt: skip
+        """Start a Python process and return its id, or 0 to start it as usual.
+
+        `streams` are descriptors of the standard streams, or -1 for those of this process.
+        """
+        raise NotImplementedError
+
+
+class Popen(_OwnStart):
+    """A `subprocess.Popen` that lets the server fork the process if the result is the same."""
+
+    _told: socket.socket | None = None
+
+    def _start(
+        self, words: Sequence[str], streams: Sequence[int], pass_fds: Sequence[int], cwd: Any,
+        env: Any, session: bool,
+    ) -> int:  # fmt: skip
+        variables = {str(k): str(v) for k, v in (os.environ if env is None else env).items()}
+        request = {"words": words[1:], "env": variables, "cwd": os.fspath(cwd or os.getcwd()),
+                   "numbers": [0, 1, 2, *pass_fds], "session": session}  # fmt: skip
+        server = _started()
+        if server is None or not server.serves(variables) or len(json.dumps(request)) > _MOST:
+            return 0
+        ends = [number if end == -1 else end for number, end in enumerate(streams)]
+        self._told = server.fork(request, [*ends, *pass_fds])
+        return int(self._told.recv(64))
 
     def _try_wait(self, wait_flags: int) -> tuple[int, int]:
         if self._told is None:
@@ -170,11 +193,6 @@ class Popen(_Popen):
                 if pid:
                     self._handle_exitstatus(status)
         return self.returncode
-
-
-def _is_plain(preexec_fn: Any, shell: Any, executable: Any, more: Sequence[Any]) -> bool:
-    """Whether a fork can have the effect of these arguments of ``Popen._execute_child``."""
-    return not (preexec_fn or shell or executable or any(more[1:4]) or more[6:] > (-1,))
 
 
 def _is_python(words: Sequence[str]) -> bool:
@@ -262,41 +280,30 @@ def _fork(request: Mapping[str, Any], descriptors: Sequence[int]) -> None:
         os.setsid()
 
 
-class _PlanPopen(_Popen):
+class _PlanPopen(_OwnStart):
     """A `subprocess.Popen` in forked processes, which forks again to plan jobs of a farm.
 
     A process that has threads cannot fork, and starts the planning process as usual.
     """
 
-    def _execute_child(
-        self, args: Any, executable: Any, preexec_fn: Any, close_fds: Any, pass_fds: Any,
-        cwd: Any, env: Any, startupinfo: Any, creationflags: Any, shell: Any,
-        p2cread: int, p2cwrite: int, c2pread: int, c2pwrite: int, errread: int, errwrite: int,
-        *more: Any,
-    ) -> None:  # fmt: skip
-        words = [] if isinstance(args, (str, bytes)) else [str(word) for word in args]
-        plans = _is_python(words) and words[1] == "-I" and words[-4:-1] == _PLAN
-        plain = _is_plain(preexec_fn, shell, executable, more) and env is None and cwd is None
-        if not (plans and plain) or len(os.listdir("/proc/self/task")) > 1:
-            super()._execute_child(
-                args, executable, preexec_fn, close_fds, pass_fds, cwd, env, startupinfo,
-                creationflags, shell, p2cread, p2cwrite, c2pread, c2pwrite, errread, errwrite,
-                *more,
-            )  # fmt: skip
-            return
+    def _start(
+        self, words: Sequence[str], streams: Sequence[int], pass_fds: Sequence[int], cwd: Any,
+        env: Any, session: bool,
+    ) -> int:  # fmt: skip
+        plans = words[1] == "-I" and words[-4:-1] == _PLAN
+        if not plans or env is not None or cwd is not None:
+            return 0
+        if len(os.listdir("/proc/self/task")) > 1:
+            return 0
         for stream in (sys.stdout, sys.stderr):
             stream.flush()
-        self.pid = os.fork()
-        if self.pid == 0:
+        pid = os.fork()
+        if pid == 0:
             try:
-                _plan(words[3:], (p2cread, c2pwrite, errwrite), bool(more[5]))
+                _plan(words[3:], streams, session)
             finally:
                 os._exit(70)
-        self._child_created = True
-        given, own = (p2cread, c2pwrite, errwrite), (p2cwrite, c2pread, errread)
-        shut = {end for end, mine in zip(given, own, strict=True) if end != -1 and mine != -1}
-        for end in shut | ({getattr(self, "_devnull", None)} - {None}):
-            os.close(end)
+        return pid
 
 
 _PLAN = ["wavecomb", "farm", "plan"]
