@@ -120,7 +120,9 @@ def test_kernels_of_all_lane_widths_are_separate_units(tmp_path: Path) -> None:
     subprocess.run([cmake, "-S", ROOT, "-B", tmp_path, "-G", "Ninja", *options], check=True)
     included: dict[str, set[str]] = defaultdict(set)
     for path in tmp_path.glob("CMakeFiles/wavecomb_core_*.dir/Unity/unity_*_cxx.cxx"):
-        for width in re.findall(r'^#include ".*/lanes/.*_(\d+)\.cpp"', path.read_text(), re.MULTILINE):
+        for width in re.findall(
+            r'^#include ".*/lanes/.*_(\d+)\.cpp"', path.read_text(), re.MULTILINE
+        ):
             included[path.name].add(width)
     assert {"1", "4"} <= set.union(*included.values())
     assert all(len(widths) == 1 for widths in included.values()), included
