@@ -80,8 +80,8 @@ TransportPilot Planner::render_pilot(const Settings& settings, LightPathShare sh
   pilot.beauty = std::move(image.beauty);
   for (AovLayer& layer : image.aovs)
     if (layer.name == aov_name(Aov::kByLightPaths)) pilot.by_light_paths = std::move(layer.values);
-  pilot.rays = counted.rays + counted.shadow_rays;
-  pilot.records = counted.records;
+  pilot.work = {static_cast<double>(counted.rays + counted.shadow_rays),
+                static_cast<double>(counted.records)};
   return pilot;
 }
 
