@@ -84,6 +84,12 @@ def parts_of(folder: Folder) -> list[Path]:
 # ---- kills and stops -----------------------------------------------------------------------------
 
 
+def check_end(client: subprocess.Popen[str]) -> None:
+    """Waits until a client ends, and checks that it gives a reason in one line if it fails."""
+    said = client.communicate(timeout=300)[1]
+    assert client.returncode in (0, -signal.SIGKILL) or said.count("\n") == 1, said
+
+
 def disturb(stage: Path, place: Path, spp: int, count: int, seed: int) -> None:
     """Kills or halts random workers, nannies and clients (which contain the scheduler)."""
     folder, chance, done = made(stage, place, spp), random.Random(seed), 0
@@ -93,9 +99,8 @@ def disturb(stage: Path, place: Path, spp: int, count: int, seed: int) -> None:
             before = len(parts_of(folder))
             wait_for(lambda: len(parts_of(folder)) > before or client.poll() is not None, 200)  # noqa: B023
             if client.poll() is not None:
-                code, said = client.returncode, client.communicate()[1]
-                assert code in (0, -signal.SIGKILL) or said.count("\n") == 1, (code, said)
-                if code == 0:
+                check_end(client)
+                if client.returncode == 0:
                     break
                 client = client_of(folder)
                 continue
@@ -111,9 +116,8 @@ def disturb(stage: Path, place: Path, spp: int, count: int, seed: int) -> None:
                 if number == signal.SIGSTOP:
                     time.sleep(chance.uniform(0.1, 1.0))
                     os.kill(target, signal.SIGCONT)
-        code = client.wait(300)
-        said = client.communicate()[1]
-        assert code in (0, -signal.SIGKILL) or said.count("\n") == 1, said
+        if client.returncode is None:
+            check_end(client)
     finally:
         client.kill()
         client.wait(10)

@@ -21,7 +21,7 @@ pytestmark = needs("wavecomb._core", "pyoidn", "bin:bash")
 
 def run(page: Path, folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, str(TOOL), str(page), "-o", str(folder), *options]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=3000)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=6000)
     assert done.returncode == 0, done.stdout + done.stderr
     return done
 

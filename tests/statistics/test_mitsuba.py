@@ -353,7 +353,8 @@ def test_preview_surface(
 ) -> None:
     """UsdPreviewSurface by the same formulas, with integrals in place of fitted polynomials.
 
-    Below opacity 1, light passes straight through. The fits are within 1.2 %, and the loss of a
+    Below opacity 1, light passes straight through, which Mitsuba counts as a bounce and Wavecomb
+    does not; at the 20th bounce, little light is left. The fits are within 1.2 %, and the loss of a
     smooth metal is limited (multiple_scattering.h), so images may differ by 0.5 % of the sky.
     """
     looks: dict[str, dict[str, Any]] = {
@@ -371,4 +372,4 @@ def test_preview_surface(
     scene = recorded(VIEW, dome, lamp, GREY, body, ground("Grey"), ball)
     if mitsuba.variant().startswith("scalar"):
         pytest.skip("the BSDF needs a vectorised variant")
-    check(f"preview {look}", scene, max_depth=6, tolerance=0.005, same_preview=True)
+    check(f"preview {look}", scene, max_depth=20, tolerance=0.005, same_preview=True)

@@ -25,6 +25,8 @@ pytestmark = needs("bin:Xvfb", "bin:xdotool", "bin:openbox")
 
 BROKEN = '#usda 1.0\ndef Xform "World"\n{\n    float x = \n'
 DAMAGED = "a stage that is damaged"
+# Its light is inside a closed sphere. Framing the sphere shows its dark outside.
+DARK_OUTSIDE = "usdlux/iesTest.usda"
 TEN = {
     "StandardShaderBall/standard_shader_ball_scene.usda": "MaterialX with textures",
     "wg_test_assets/MaterialXTest/basicTextured.usda": ".mtlx files",
@@ -134,7 +136,7 @@ def edit(person, tmp_path, name):
     return slot, float(wanted)
 
 
-def save(person, tmp_path, slot, value):
+def save(person, tmp_path, name, slot, value):
     """Saves the edits as a layer and the image as a file."""
     layer, picture = tmp_path / "my_edits.usda", tmp_path / "my picture.exr"
     for path in (layer, picture):
@@ -155,7 +157,8 @@ def save(person, tmp_path, slot, value):
     person.answer("QFileDialog", str(picture))
     person.wait(lambda: picture.name in person.ask("state")["status"], "the picture to be written")
     pixels = oiio.ImageBuf(str(picture)).get_pixels(oiio.FLOAT)
-    assert pixels.shape[:2] == (120, 160) and pixels[..., :3].max() > 0.05
+    assert pixels.shape[:2] == (120, 160)
+    assert (pixels[..., :3].max() > 0.05) == (name != Path(DARK_OUTSIDE).stem)
 
 
 def compare(person, tmp_path, name):
@@ -176,7 +179,7 @@ def use(person, tmp_path, name):
     orbit(person, tmp_path, name)
     select(person)
     done = edit(person, tmp_path, name)
-    save(person, tmp_path, *(done or (None, None)))
+    save(person, tmp_path, name, *(done or (None, None)))
     compare(person, tmp_path, name)
     state = person.settled()
     assert state["message"] == "", state["message"]
