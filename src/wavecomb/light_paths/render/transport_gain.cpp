@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <span>
 
 #include "wavecomb/core/vec.h"
 
@@ -17,9 +18,10 @@ constexpr double kPathVertex = 0.7, kJointVertex = 0.8;
 /// of the cost of one ray.
 constexpr double kMergedPath = 1, kMergedVertex = 1;
 /// A second noise estimate leaves out the noisiest pixels, which are this fraction of all pixels.
-/// In a small image, a single pixel may cause most of the noise, and results then differ between
-/// pilot renders.
 constexpr double kNoisiest = 0.01;
+/// Effective number of pixels at which both estimates have the same weight. In a small image, a
+/// single pixel may cause most of the noise, which then says little about other pilot renders.
+constexpr double kReliablePixels = 10;
 /// Upper limit of a pixel's estimated squared error in a render without light paths, relative to
 /// the squared radiance that light paths contribute to the pixel. Light that camera paths rarely
 /// sample leaves nearly all pixels black and makes a few pixels far too bright.
@@ -75,17 +77,25 @@ PixelNoise noise_between(const std::vector<float>& a, const std::vector<float>& 
   return noise;
 }
 
-double sum(const PixelNoise& noise) {
-  return std::accumulate(noise.begin(), noise.end(), 0.0);
+/// Returns how many pixels there are without the noisiest ones.
+ptrdiff_t most_of(const PixelNoise& noise) {
+  return std::ssize(noise) - static_cast<ptrdiff_t>(kNoisiest * static_cast<double>(noise.size()));
 }
 
-/// Returns the sum of the noise of all pixels, without the noisiest pixels (a fraction `kNoisiest`
-/// of all pixels).
-double sum_of_most(PixelNoise noise) {
-  const auto most =
-      noise.end() - static_cast<ptrdiff_t>(kNoisiest * static_cast<double>(noise.size()));
-  if (most != noise.end()) std::nth_element(noise.begin(), most, noise.end());
-  return std::accumulate(noise.begin(), most, 0.0);
+/// Returns the sum of the noise over all pixels, the sum without the noisiest pixels (a fraction
+/// `kNoisiest` of all pixels), and the effective number of pixels.
+PilotError sums(PixelNoise noise) {
+  PilotError error;
+  double squares = 0;
+  for (const double n : noise) {
+    error.all += n;
+    squares += n * n;
+  }
+  error.pixels = ratio_of(error.all * error.all, squares);
+  const auto most = noise.begin() + most_of(noise);
+  std::nth_element(noise.begin(), most, noise.end());
+  error.of_most = std::accumulate(noise.begin(), most, 0.0);
+  return error;
 }
 
 /// Returns whether the images of a ratio were rendered.
@@ -102,21 +112,23 @@ const std::array<TransportPilot, 2>& smallest_ratio(const TransportPilots& pilot
 /// 1 / brightness^2 for each pixel.
 PilotError error_without(const TransportPilots& pilots, const std::vector<double>& scale,
                          double longer) {
-  PixelNoise camera = noise_between(pilots.path[0].beauty, pilots.path[1].beauty, scale);
-  PixelNoise left(pilots.variance.size());
+  const PilotError camera =
+      sums(noise_between(pilots.path[0].beauty, pilots.path[1].beauty, scale));
+  PixelNoise by_missed(pilots.variance.size());
   const auto& [first, second] = smallest_ratio(pilots);
   const double missed = missed_light(pilots);
-  for (size_t i = 0; i < left.size(); ++i) {
+  for (size_t i = 0; i < by_missed.size(); ++i) {
     const double l0 = brightness(first.by_light_paths, i);
     const double l1 = brightness(second.by_light_paths, i);
     const double bound = kMaxLost * std::max(0.0, l0 * l1) * longer;
-    left[i] = missed * std::min(pilots.variance[i] / kTransportSamples, bound) * scale[i];
+    by_missed[i] = missed * std::min(pilots.variance[i] / kTransportSamples, bound) * scale[i];
   }
   const double cost = mean_work(pilots.path).cost(kPathVertex);
-  PilotError error;
-  error.all = (sum(camera) + sum(left)) * cost;
-  error.of_most = (sum_of_most(std::move(camera)) + sum_of_most(std::move(left))) * cost;
-  return error;
+  const PilotError left = sums(std::move(by_missed));
+  const double all = camera.all + left.all;
+  const double squares =
+      ratio_of(camera.all * camera.all, camera.pixels) + ratio_of(left.all * left.all, left.pixels);
+  return {all * cost, (camera.of_most + left.all) * cost, ratio_of(all * all, squares)};
 }
 
 /// Squared relative error and cost of a ratio of light paths.
@@ -124,7 +136,7 @@ struct RatioEstimate {
   PilotError noise, light;  ///< of the image, and of the part that light paths contribute
   double cost = 0, light_cost = 0;
 
-  PilotError error() const { return {noise.all * cost, noise.of_most * cost}; }
+  PilotError error() const { return {noise.all * cost, noise.of_most * cost, noise.pixels}; }
 };
 
 RatioEstimate estimate(const TransportPilots& pilots, size_t ratio,
@@ -137,13 +149,8 @@ RatioEstimate estimate(const TransportPilots& pilots, size_t ratio,
     found.cost += kMergedPath * kTransportSamples * static_cast<double>(scale.size()) +
                   kMergedVertex * (work.records - without.records);
   found.light_cost = std::max(0.0, found.cost - without.cost(kJointVertex));
-  const auto of = [&](const std::vector<float>& a, const std::vector<float>& b) {
-    PixelNoise noise = noise_between(a, b, scale);
-    const double all = sum(noise);
-    return PilotError{all, sum_of_most(std::move(noise))};
-  };
-  found.noise = of(with[0].beauty, with[1].beauty);
-  found.light = of(with[0].by_light_paths, with[1].by_light_paths);
+  found.noise = sums(noise_between(with[0].beauty, with[1].beauty, scale));
+  found.light = sums(noise_between(with[0].by_light_paths, with[1].by_light_paths, scale));
   return found;
 }
 
@@ -154,16 +161,21 @@ RatioEstimate with_more_paths(RatioEstimate estimate, double factor) {
     return std::max(0.0, noise - light) + light / factor;
   };
   estimate.noise = {fewer(estimate.noise.all, estimate.light.all),
-                    fewer(estimate.noise.of_most, estimate.light.of_most)};
-  estimate.light = {estimate.light.all / factor, estimate.light.of_most / factor};
+                    fewer(estimate.noise.of_most, estimate.light.of_most), estimate.noise.pixels};
+  estimate.light.all /= factor;
+  estimate.light.of_most /= factor;
   estimate.cost += (factor - 1) * estimate.light_cost;
   estimate.light_cost *= factor;
   return estimate;
 }
 
-/// Returns the ratio of two errors: the geometric mean of both estimates.
+/// Returns the ratio of two errors: the weighted geometric mean of the ratio over all pixels and
+/// the ratio without the noisiest pixels.
 double ratio_of(const PilotError& a, const PilotError& b) {
-  return std::sqrt(ratio_of(a.all, b.all) * ratio_of(a.of_most, b.of_most));
+  const double pixels = std::min(a.pixels, b.pixels);
+  const double weight = pixels / (pixels + kReliablePixels);
+  return std::pow(ratio_of(a.all, b.all), weight) *
+         std::pow(ratio_of(a.of_most, b.of_most), 1 - weight);
 }
 
 /// Returns 1 / brightness^2 of each pixel.
@@ -183,9 +195,15 @@ std::vector<double> inverse_squares(const TransportPilots& pilots) {
 double missed_light(const TransportPilots& pilots) {
   const auto& with = smallest_ratio(pilots);
   const std::vector<double> scale = inverse_squares(pilots);
+  const PixelNoise noise = noise_between(pilots.path[0].beauty, pilots.path[1].beauty, scale);
+  std::vector<size_t> order(noise.size());
+  std::iota(order.begin(), order.end(), size_t{0});
+  const auto most = order.begin() + most_of(noise);
+  std::nth_element(order.begin(), most, order.end(),
+                   [&](size_t a, size_t b) { return noise[a] < noise[b]; });
   double by_light_paths = 0, found = 0;
   for (size_t seed = 0; seed < with.size(); ++seed)
-    for (size_t i = 0; i < scale.size(); ++i) {
+    for (const size_t i : std::span(order.begin(), most)) {
       const double light = brightness(with[seed].by_light_paths, i);
       const double camera = double{brightness(with[seed].beauty, i)} - light;
       const double weight = std::sqrt(scale[i]);
@@ -231,7 +249,8 @@ double merging_gain(const TransportGain& merged, const TransportGain& unmerged) 
   };
   const PilotError error = {
       unmerged_error(unmerged.with.all, merged.without.all - unmerged.without.all),
-      unmerged_error(unmerged.with.of_most, merged.without.of_most - unmerged.without.of_most)};
+      unmerged_error(unmerged.with.of_most, merged.without.of_most - unmerged.without.of_most),
+      merged.without.pixels};
   return ratio_of(error, merged.with);
 }
 

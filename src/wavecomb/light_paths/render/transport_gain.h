@@ -10,8 +10,10 @@
 /// missed light. Its squared error e_left is estimated from light paths
 /// (light_paths/light_vertex.h). The gain in efficiency is
 ///   (e + (1 - (P - C) / L) e_left) c / (e_s c_s).
-/// Each error is estimated over all pixels, and without the noisiest pixels. Both estimates are
-/// uncertain, and gains are the geometric mean of both.
+/// Each error is estimated over all pixels, and without the noisiest pixels. The first estimate is
+/// uncertain if few pixels hold most of the noise, and the second lacks what these hold. Gains are
+/// a geometric mean of both, in which the first counts more the more pixels hold the noise: their
+/// effective number is (sum n)^2 / (sum n^2), where n is the noise of a pixel.
 ///
 /// Caustics that the camera sees in mirrors or through glass are found by merging only
 /// (light_paths/merge_grid.h). Their squared error without merging is estimated as p_merged - p: p
@@ -68,12 +70,14 @@ struct TransportPilots {
 };
 
 /// Returns the fraction of the light contributed by light paths that camera paths do not find, from
-/// the images of the smallest ratio that has images.
+/// the images of the smallest ratio that has images. Pixels in which camera paths are noisiest do
+/// not count, since these are the few pixels in which camera paths hit a caustic by chance.
 double missed_light(const TransportPilots& pilots);
 
 /// Squared relative error times cost, over all pixels and without the noisiest pixels.
 struct PilotError {
   double all = 0, of_most = 0;
+  double pixels = 0;  ///< effective number of pixels that hold the noise
 };
 
 /// Predicted gain by light paths.
