@@ -22,11 +22,12 @@ constexpr uint64_t kTransportShare = 1000;
 constexpr std::array<uint32_t, 2> kTransportSeeds = {0x3c6ef372u, 0xa54ff53au};
 /// Minimum predicted gain in efficiency for which light paths are used.
 constexpr double kMinLightPathGain = 1.3;
-/// Predictions of the larger ratio from the smaller one are at least this exact.
+/// Gains of the larger ratio predicted from the smaller one are correct to within this factor.
 constexpr double kPredictionFactor = 1.5;
 /// Minimum fraction of missed light for which the noise of this light is estimated.
 constexpr double kMinMissed = 0.1;
-/// Minimum predicted gain of merging over light paths without merging.
+/// Minimum predicted gain of merging over renders without light paths, and over light paths without
+/// merging.
 constexpr double kMinMergingGain = 2;
 /// Roughness below which a lobe is sharp enough for visible caustics.
 constexpr float kSharpRoughness = 0.4f;
@@ -51,6 +52,7 @@ Settings pilot_settings(const Settings& settings, uint32_t width, uint32_t heigh
   small.width = width;
   small.height = height;
   small.spp = kTransportSamples;
+  small.overscan = static_cast<uint32_t>(uint64_t{small.overscan} * width / settings.width);
   small.region.reset();
   small.crop = false;
   small.time_limit = 0;
@@ -222,7 +224,7 @@ TransportChoice choose_transport(const Scene& scene, const Settings& settings, u
     if (is_late()) return choice;
     const TransportGain by_merging = transport_gain(merged.pilots(), longer);
     choice.merges =
-        by_merging.gain >= kMinLightPathGain && merging_gain(by_merging, found) >= kMinMergingGain;
+        by_merging.gain >= kMinMergingGain && merging_gain(by_merging, found) >= kMinMergingGain;
     if (choice.merges) found = by_merging;
   }
   choice.gain = found.gain;

@@ -176,7 +176,9 @@ RatioEstimate with_more_paths(RatioEstimate estimate, double factor) {
 /// the ratio without the noisiest pixels.
 double ratio_of(const PilotError& a, const PilotError& b) {
   const double pixels = std::min(a.pixels, b.pixels);
-  const double weight = pixels / (pixels + kReliablePixels);
+  // Where only the noisiest pixels are noisy, the second ratio is undefined.
+  const bool is_defined = a.of_most > 0 && b.of_most > 0;
+  const double weight = is_defined ? pixels / (pixels + kReliablePixels) : 1;
   return std::pow(ratio_of(a.all, b.all), weight) *
          std::pow(ratio_of(a.of_most, b.of_most), 1 - weight);
 }

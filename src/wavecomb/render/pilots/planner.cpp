@@ -92,8 +92,10 @@ TransportChoice Planner::choose(const Settings& settings, const RenderOptions& o
     // The scene or the settings may have changed since the earlier render.
     Settings used = settings;
     if (earlier.merges && used.merge_radius == 0) used.merge_radius = 1.f;
+    const bool may_merge = !earlier.merges || settings.auto_merge || settings.merge_radius > 0;
     if (earlier.transport == Transport::kPath ||
-        (light_path_conflict(used).what.empty() && light_path_conflict(*scene_).what.empty()))
+        (may_merge && light_path_conflict(used).what.empty() &&
+         light_path_conflict(*scene_).what.empty()))
       return earlier;
   }
   if (options.resume) {  // The checkpoint is from a version that stored no choice of transport and

@@ -156,12 +156,13 @@ Settings training_settings(Settings settings) {
 }
 
 /// Returns a copy of the settings in which all settings that do not affect the choice of the
-/// transport have their defaults. AOVs and light path expressions are not reset, since some exclude
-/// light paths.
+/// transport have their defaults. AOVs, light path expressions and errors of pixels are not reset,
+/// since some exclude light paths or merging.
 Settings choice_settings(const Settings& settings) {
   Settings kept = training_settings(settings);
   kept.aovs = settings.aovs;
   kept.expressions = settings.expressions;
+  kept.error = settings.error;
   return kept;
 }
 
