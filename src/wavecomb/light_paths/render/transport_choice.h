@@ -3,15 +3,15 @@
 ///
 /// A render traces no light paths if the settings or the scene do not support them, if no surface
 /// is transmissive or glossy, or if no light emits light paths. Otherwise small images of the whole
-/// view are rendered before the first pass, two for each candidate ratio of light paths. (Each
-/// ratio needs separate images, because the ratio determines the MIS weights, and these affect the
-/// noise of both kinds of paths.) The images of the larger ratio are rendered only if those of the
-/// smaller ratio suggest a gain. In scenes with caustics that only merging finds
-/// (light_paths/merge_grid.h), images with merging at the larger ratio follow. transport_gain.h
-/// computes gains from these images. Merging blurs caustics by up to a pixel, and is used only for
-/// a large gain. The choice does not depend on seed, region, threads, waves or lanes, so that
-/// crops, resumed renders and merged renders use the same transport. Samples of the pilot do not
-/// contribute to the image.
+/// view are rendered before the first pass: two without light paths, and two for each candidate
+/// ratio of light paths. (Each ratio needs separate images, because the ratio determines the MIS
+/// weights, and these affect the noise of both kinds of paths.) The images of the larger ratio are
+/// rendered only if those of the smaller ratio suggest a gain. In scenes with caustics that only
+/// merging finds (light_paths/merge_grid.h), images with merging at the larger ratio follow.
+/// transport_gain.h computes gains from these images. Merging blurs caustics by up to a pixel, and
+/// is used only for a large gain. The choice does not depend on seed, region, threads, waves or
+/// lanes, so that crops, resumed renders and merged renders use the same transport. Samples of the
+/// pilot do not contribute to the image.
 #pragma once
 
 #include <cstdint>
