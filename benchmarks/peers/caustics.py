@@ -162,9 +162,11 @@ def picture(
     return np.load(file).astype(np.float64), answer
 
 
-def samples(process: Process, args: argparse.Namespace) -> int:
-    """Return the number of samples that fit into ``--seconds``; a square number for multijitter."""
-    spp = 4
+def samples(process: Process, args: argparse.Namespace, spp: int = 4) -> int:
+    """Return the number of samples that fit into ``--seconds``; a square number for multijitter.
+
+    The first render takes ``spp`` samples, and those that follow four times as many each.
+    """
     while True:
         process.render(spp, TRIAL_SEED)  # compiles kernels
         took = process.render(spp, TRIAL_SEED + spp)["seconds"]

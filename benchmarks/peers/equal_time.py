@@ -158,7 +158,9 @@ def measure(
     """Render the rounds of one stage with one budget of time; return the table row."""
     processes = {r: Process(r, job, args.cache / f"{r}.log", {}) for r in references}
     trial = argparse.Namespace(seconds=seconds, reference=args.reference_spp)
-    spp = {r: fitted(process, samples(process, trial), seconds) for r, process in processes.items()}
+    # Wavecomb decides by the number of samples whether it guides paths, so renders much shorter
+    # than `seconds` do not predict the time. The second call starts with the result of the first.
+    spp = {r: samples(p, trial, samples(p, trial)) for r, p in processes.items()}
     for r, process in processes.items():
         if RENDERERS[r].warm:
             process.render(spp[r], 100)
@@ -197,17 +199,6 @@ def measure(
             f"trimmed {show(out['trimmed_efficiency'][r], 2)}"
         )
     return out
-
-
-def fitted(process: Process, spp: int, seconds: float) -> int:
-    """Return how many samples a render of ``seconds`` takes, a square; ``spp`` is a first guess.
-
-    Short trials do not predict the time of Wavecomb, which decides by the number of samples whether
-    it guides paths.
-    """
-    process.render(spp, 100)  # compiles kernels
-    took = process.render(spp, 101)["seconds"]
-    return max(1, round((spp * seconds / max(took, 1e-3)) ** 0.5) ** 2)
 
 
 def products(values: dict[str, list[float]], kind: str) -> list[float]:

@@ -16,8 +16,8 @@ namespace {
 /// Limits of the number of pixels of a pilot render.
 constexpr uint64_t kMinTransportPixels = 400, kMaxTransportPixels = 16'384;
 /// A pilot render takes one sample for every kTransportShare samples of the render. There are at
-/// least four pilot renders, and at most ten where merging may pay. Together they take about a
-/// hundredth of the render time.
+/// least four pilot renders, and at most ten if merging is considered. Together they take 2 % of
+/// the render time on average.
 constexpr uint64_t kTransportShare = 1000;
 constexpr std::array<uint32_t, 2> kTransportSeeds = {0x3c6ef372u, 0xa54ff53au};
 /// Minimum predicted gain in efficiency for which light paths are used.
@@ -110,7 +110,7 @@ bool shows_caustics(const Scene& scene) {
                              [&](const Material& m) { return may_have_lobe(m, is_smooth); });
 }
 
-/// Renders pilots with one size.
+/// Makes pilot renders that share all settings except seed, transport and merging.
 class PilotRenders {
  public:
   PilotRenders(const Settings& small, const RenderPilot& render) : small_(small), render_(render) {
@@ -126,10 +126,10 @@ class PilotRenders {
     path.aovs.bits = 0;
     pilots_.path = both(path, kCandidateShares[0]);
   }
-  /// Uses the images without light paths of another object.
+  /// Copies the images without light paths from `other`, to avoid rendering them again.
   void add_path(const PilotRenders& other) { pilots_.path = other.pilots_.path; }
 
-  /// Renders the images of a ratio.
+  /// Renders the images of the ratio with index `ratio` in kCandidateShares.
   void add(size_t ratio) { pilots_.with[ratio] = both(small_, kCandidateShares[ratio]); }
 
   /// Renders the image of variances, unless camera paths find nearly all light that light paths

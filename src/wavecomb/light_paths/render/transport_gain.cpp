@@ -109,15 +109,40 @@ const std::array<TransportPilot, 2>& smallest_ratio(const TransportPilots& pilot
   return *std::ranges::find_if(pilots.with, is_rendered);
 }
 
+/// Computes `missed_light` with the given values of 1 / brightness^2 for each pixel, and the noise
+/// without light paths.
+double missed_light(const TransportPilots& pilots, const std::vector<double>& scale,
+                    const PixelNoise& noise) {
+  const auto& with = smallest_ratio(pilots);
+  std::vector<size_t> order(noise.size());
+  std::iota(order.begin(), order.end(), size_t{0});
+  const auto most = order.begin() + most_of(noise);
+  std::nth_element(order.begin(), most, order.end(),
+                   [&](size_t a, size_t b) { return noise[a] < noise[b]; });
+  double by_light_paths = 0, found = 0;
+  for (size_t seed = 0; seed < with.size(); ++seed)
+    for (const size_t i : std::span(order.begin(), most)) {
+      const double light = brightness(with[seed].by_light_paths, i);
+      const double camera = double{brightness(with[seed].beauty, i)} - light;
+      const double weight = std::sqrt(scale[i]);
+      by_light_paths += weight * light;
+      found += weight * (double{brightness(pilots.path[seed].beauty, i)} - camera);
+    }
+  return 1 - std::clamp(ratio_of(found, by_light_paths), 0.0, 1.0);
+}
+
+PixelNoise noise_without(const TransportPilots& pilots, const std::vector<double>& scale) {
+  return noise_between(pilots.path[0].beauty, pilots.path[1].beauty, scale);
+}
+
 /// Returns the squared relative error times cost without light paths. `scale` holds
 /// 1 / brightness^2 for each pixel.
 PilotError error_without(const TransportPilots& pilots, const std::vector<double>& scale,
                          double longer) {
-  const PilotError camera =
-      sums(noise_between(pilots.path[0].beauty, pilots.path[1].beauty, scale));
+  PixelNoise noise = noise_without(pilots, scale);
   PixelNoise by_missed(pilots.variance.size());
   const auto& [first, second] = smallest_ratio(pilots);
-  const double missed = missed_light(pilots);
+  const double missed = missed_light(pilots, scale, noise);
   for (size_t i = 0; i < by_missed.size(); ++i) {
     const double l0 = brightness(first.by_light_paths, i);
     const double l1 = brightness(second.by_light_paths, i);
@@ -125,7 +150,7 @@ PilotError error_without(const TransportPilots& pilots, const std::vector<double
     by_missed[i] = missed * std::min(pilots.variance[i] / kTransportSamples, bound) * scale[i];
   }
   const double cost = mean_work(pilots.path).cost(kPathVertex);
-  const PilotError left = sums(std::move(by_missed));
+  const PilotError camera = sums(std::move(noise)), left = sums(std::move(by_missed));
   const double all = camera.all + left.all;
   const double squares =
       ratio_of(camera.all * camera.all, camera.pixels) + ratio_of(left.all * left.all, left.pixels);
@@ -198,24 +223,8 @@ std::vector<double> inverse_squares(const TransportPilots& pilots) {
 }  // namespace
 
 double missed_light(const TransportPilots& pilots) {
-  const auto& with = smallest_ratio(pilots);
   const std::vector<double> scale = inverse_squares(pilots);
-  const PixelNoise noise = noise_between(pilots.path[0].beauty, pilots.path[1].beauty, scale);
-  std::vector<size_t> order(noise.size());
-  std::iota(order.begin(), order.end(), size_t{0});
-  const auto most = order.begin() + most_of(noise);
-  std::nth_element(order.begin(), most, order.end(),
-                   [&](size_t a, size_t b) { return noise[a] < noise[b]; });
-  double by_light_paths = 0, found = 0;
-  for (size_t seed = 0; seed < with.size(); ++seed)
-    for (const size_t i : std::span(order.begin(), most)) {
-      const double light = brightness(with[seed].by_light_paths, i);
-      const double camera = double{brightness(with[seed].beauty, i)} - light;
-      const double weight = std::sqrt(scale[i]);
-      by_light_paths += weight * light;
-      found += weight * (double{brightness(pilots.path[seed].beauty, i)} - camera);
-    }
-  return 1 - std::clamp(ratio_of(found, by_light_paths), 0.0, 1.0);
+  return missed_light(pilots, scale, noise_without(pilots, scale));
 }
 
 TransportGain transport_gain(const TransportPilots& pilots, double longer) {

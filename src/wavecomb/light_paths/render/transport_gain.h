@@ -63,7 +63,7 @@ struct TransportPilots {
   /// images are no candidates.
   std::array<TransportPilot, 2> with[kCandidateShares.size()];
   /// Estimated variance per sample of each pixel if only camera paths sampled the light that light
-  /// paths now contribute.
+  /// paths now contribute; empty if camera paths find nearly all of it.
   std::vector<double> variance;
   uint32_t width = 0;
   bool merges = false;
